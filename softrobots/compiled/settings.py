@@ -64,6 +64,9 @@ MIN_LANES = 8
 LANE_MEMORY = 65_536
 """Workspace of all lanes together [bytes]."""
 
+CHUNK = 8192
+"""Cases that a thread takes at a time; few, as another program may slow one thread down."""
+
 OBSERVABLE = force_search.OBSERVABLE
 """Smallest singular value of the elastostatic Jacobian at which every force is observable, relative to the reach."""
 

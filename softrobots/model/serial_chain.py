@@ -154,9 +154,20 @@ class SerialChain:
         return spans
 
     @cached_property
+    def masses_beyond(self) -> tuple[float, ...]:
+        """Mass beyond each element, without its own [kg]."""
+        own = [sum(body.mass for body in bodies_of(element)) for element in self.elements]
+        return tuple(sum(own[row + 1 :], 0.0) for row in range(len(own)))
+
+    @cached_property
     def element_of(self) -> dict[int, int]:
         """Element of each strain."""
         return {strain: row for row, element in enumerate(self.elements) for strain in strains_of(element)}
+
+
+def bodies_of(element: Element) -> tuple[ChainBody, ...]:
+    """Return the bodies of an element."""
+    return element.bodies if isinstance(element, ChainSection) else (element.body,)
 
 
 def strains_of(element: Element) -> tuple[int, ...]:

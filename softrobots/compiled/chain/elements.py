@@ -70,8 +70,9 @@ def matrix(rows: Sequence[Sequence[Scalar]]) -> Vector:
 
 
 def constants(values: Any) -> Vector:
-    """Return an array of constants as plain floats."""
-    return np.asarray(values, dtype=np.float64).astype(object)
+    """Return an array of constants as plain floats; an array of objects as it is."""
+    array = np.asarray(values)
+    return array.copy() if array.dtype == object else array.astype(np.float64).astype(object)
 
 
 def cross(one: Vector, other: Vector) -> Vector:

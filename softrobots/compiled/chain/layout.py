@@ -35,7 +35,8 @@ torque that the force does not explain; squared smallest singular value of the e
 [m]; largest distance from a target [m]; number of steps."""
 
 
-_COUNTS = ("unknowns", "conditions", "muscles", "constraints", "singles", "prepared")  # no places for callers
+_COUNTS = ("unknowns", "conditions", "muscles", "constraints", "inputs")
+_COUNTS += ("singles", "numbers", "prepared")  # no places for callers
 
 
 def assign_places(layout: Any, first: int, **sizes: int) -> None:
@@ -59,6 +60,8 @@ class Layout:
     """Number of muscles with an input: all but those that constrain sums of unknowns."""
     constraints: int = 0
     """Number of sums that muscle lengths constrain."""
+    inputs: int = 0
+    """Number of numbers of the robot that are inputs of its code, see `numbers.NumberInputs`."""
     force: int = field(init=False)
     """Force on the tip, world axes [N] (3)."""
     gravity: int = field(init=False)
@@ -95,8 +98,10 @@ class Layout:
     """Difference of the waypoint's solution from that: motors, then unknowns."""
     singles: int = field(init=False)
     """The numbers of `SINGLES`."""
+    numbers: int = field(init=False)
+    """Numbers of the robot that are inputs."""
     prepared: int = field(init=False)
-    """Values that depend on motors and load only; as many places as the code needs."""
+    """Values that depend on motors, load and numbers of the robot only; as many places as the code needs."""
 
     def __post_init__(self) -> None:
         """Compute the places."""
@@ -107,7 +112,7 @@ class Layout:
         )
         points = dict(next_point=point, previous=point, predicted=point, correction=point)
         searches = dict(tip=3, torques=motors, target=self.target_size, next_target=self.target_size)
-        rest = dict(singles=len(SINGLES), prepared=0)
+        rest = dict(singles=len(SINGLES), numbers=self.inputs, prepared=0)
         assign_places(self, motors, force=3, gravity=3, **before_tip, **searches, **points, **rest)
 
     @property

@@ -16,12 +16,12 @@ from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import JointState, RigidBody, SectionState, joint_state, round_part
 from softrobots.compiled.chain.muscle_terms import pulls_on
 from softrobots.compiled.chain.recursion import TracedElement, range_margin
-from softrobots.compiled.chain.unknowns import Unknowns, bodies_of
+from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, if_less
 from softrobots.compiled.trace.tables import TableColumns
 from softrobots.core.checks import FloatArray
-from softrobots.model.serial_chain import ChainBody, ChainJoint
+from softrobots.model.serial_chain import ChainBody, ChainJoint, bodies_of
 
 _OUT_OF_RANGE = 1e200  # torque on a section beyond its range: a step that ends there does not converge
 _MOST_JOINTS = 4  # of a group: its cost grows with their square

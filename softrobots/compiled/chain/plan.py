@@ -8,10 +8,12 @@ from functools import cached_property
 from softrobots.compiled.chain.elements import symmetric, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
+from softrobots.compiled.chain.numbers import NumberInputs
 from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Expression
+from softrobots.model.serial_chain import SerialChain
 
 
 @dataclass(frozen=True)
@@ -26,12 +28,19 @@ class Plan:
     """Whether targets of the tip are poses."""
     tip: TipLayout | None = None
     """Places of the response of the tip, in code of looped chains that traces it."""
+    inputs: NumberInputs | None = None
+    """The numbers of the chain that are inputs of the code; None if all are constants."""
+
+    def numbers_in(self, block: Block) -> SerialChain:
+        """Return the chain with expressions of a block instead of the numbers that are inputs."""
+        chain = self.unknowns.chain
+        return chain if self.inputs is None else self.inputs.traced(chain, block.loads(self.layout.numbers, self.inputs.count))
 
     @cached_property
     def layout(self) -> Layout:
         """Places of the numbers of a case."""
         unknowns, conditions = self.unknowns, 6 if self.poses else 3
-        counts = unknowns.n_tensions, unknowns.n_constraints
+        counts = unknowns.n_tensions, unknowns.n_constraints, 0 if self.inputs is None else self.inputs.count
         return Layout(unknowns.chain.n_motors, len(unknowns.strains), conditions, *counts)
 
     @cached_property

@@ -9,20 +9,22 @@ from softrobots.compiled.chain.recursion import SpringLaw, TracedElement
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.expressions import Scalar, if_less, inverse_cube_root, larger, square_root
 from softrobots.inflated_beam.membrane_tube import softening
+from softrobots.model.serial_chain import SerialChain
 
 
-def with_slack_hinges(unknowns: Unknowns, elements: Sequence[TracedElement]) -> list[TracedElement]:
-    """Return the elements with the laws of the springs of slack hinges."""
+def with_slack_hinges(unknowns: Unknowns, elements: Sequence[TracedElement], numbers: SerialChain) -> list[TracedElement]:
+    """Return the elements with the laws of the springs of slack hinges; `numbers` holds the moments at which they go slack."""
     traced = list(elements)
-    for inner, outer, slack_moment in unknowns.slack_hinges:
+    for place, (inner, outer, _) in enumerate(unknowns.slack_hinges):
+        slack_moment = numbers.slack_hinges[place][2]
         angles = [traced[row].coordinates[0] - traced[row].rest[0] for row in (inner, outer)]
-        laws = _laws(angles[0], angles[1], float(traced[inner].stiffness[0]), slack_moment)  # type: ignore[arg-type]
+        laws = _laws(angles[0], angles[1], traced[inner].stiffness[0], slack_moment)
         for row, law in zip((inner, outer), laws, strict=True):
             traced[row] = replace(traced[row], law=law)
     return traced
 
 
-def _laws(inner: Scalar, outer: Scalar, stiffness: float, slack_moment: float) -> tuple[SpringLaw, SpringLaw]:
+def _laws(inner: Scalar, outer: Scalar, stiffness: Scalar, slack_moment: Scalar) -> tuple[SpringLaw, SpringLaw]:
     """Laws of both springs at their angles from rest [rad]; linear to the last digit up to the first slack fibre."""
     first = slack_moment / stiffness
     square = larger(inner * inner + outer * outer, first * first)

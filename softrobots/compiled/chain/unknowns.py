@@ -15,12 +15,12 @@ from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.recursion import TracedElement
 from softrobots.compiled.settings import LARGEST_NUMBER, LARGEST_POSITION, MAX_UNROLLED_JOINTS
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.expressions import Scalar, scalar
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.model.actuator_laws import ROUNDING, ActuatorLaws
-from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain, strains_of
+from softrobots.model.serial_chain import ChainJoint, ChainSection, SerialChain, bodies_of, strains_of
 
 STRETCHED = ("elastic", "mckibben")
 """Kinds of actuators whose tension depends on the length."""
@@ -122,12 +122,6 @@ class Unknowns:
         rows = {strains_of(element)[0]: row for row, element in enumerate(self.chain.elements) if strains_of(element)}
         return tuple((rows[inner], rows[outer], moment) for inner, outer, moment in self.chain.slack_hinges)
 
-    @cached_property
-    def masses_beyond(self) -> tuple[float, ...]:
-        """Mass beyond each element, without its own [kg]."""
-        own = [sum(body.mass for body in bodies_of(element)) for element in self.chain.elements]
-        return tuple(float(sum(own[row + 1 :])) for row in range(len(own)))
-
     def motor(self, row: int) -> int | None:
         """Return the number of the motor that an element is; None for other elements."""
         element = self.chain.elements[row]
@@ -144,7 +138,11 @@ class Unknowns:
         return [self.traced(row, block.load) for row in range(self.leading_motors)]
 
     def traced(
-        self, row: int, motor: Callable[[int], Scalar] = lambda _: 0.0, unknown: Callable[[int], Scalar] = lambda _: 0.0
+        self,
+        row: int,
+        motor: Callable[[int], Scalar] = lambda _: 0.0,
+        unknown: Callable[[int], Scalar] = lambda _: 0.0,
+        numbers: SerialChain | None = None,
     ) -> TracedElement:
         """Return an element with its constants, without muscle tensions.
 
@@ -152,8 +150,10 @@ class Unknowns:
             row: Index of the element.
             motor: Position of a motor by its number.
             unknown: An unknown by its place.
+            numbers: The chain with expressions instead of some of its numbers.
         """
-        element, chain = self.chain.elements[row], self.chain
+        chain = self.chain if numbers is None else numbers
+        element = chain.elements[row]
         strains = strains_of(element)
         moving = tuple(place for place, strain in enumerate(strains) if strain in self.place)
         places = [self.place[strains[one]] for one in moving]
@@ -163,18 +163,18 @@ class Unknowns:
         else:
             kind = "section"
             coordinates = [
-                unknown(self.place[strain]) if strain in self.place else float(chain.rest[strain]) for strain in strains
+                unknown(self.place[strain]) if strain in self.place else scalar(chain.rest[strain]) for strain in strains
             ]
         return TracedElement(
             kind=kind,
             rotation=constants(element.rotation),
             translation=constants(element.translation),
-            bodies=[(float(body.mass), constants(body.first_moment)) for body in bodies_of(element)],
-            mass_beyond=self.masses_beyond[row],
+            bodies=[(scalar(body.mass), constants(body.first_moment)) for body in bodies_of(element)],
+            mass_beyond=scalar(chain.masses_beyond[row]),
             coordinates=coordinates,
             moving=moving,
-            stiffness=[float(chain.stiffness[strains[one]]) for one in moving],
-            rest=[float(chain.rest[strains[one]]) for one in moving],
+            stiffness=[scalar(chain.stiffness[strains[one]]) for one in moving],
+            rest=[scalar(chain.rest[strains[one]]) for one in moving],
             muscles=self._muscles(row, strains),
             constraints=tuple(self.multiplier.get(strains[one]) for one in moving),
             length=element.length if isinstance(element, ChainSection) else 0.0,
@@ -282,7 +282,3 @@ class Unknowns:
             element.strain + row for element in self.chain.elements if isinstance(element, ChainSection) for row in rows
         )
 
-
-def bodies_of(element: Element) -> tuple[ChainBody, ...]:
-    """Return the bodies of an element."""
-    return element.bodies if isinstance(element, ChainSection) else (element.body,)

@@ -19,7 +19,7 @@ from softrobots.compiled.chain.recursion import Balance, InwardPass, OutwardPass
 from softrobots.compiled.chain.slack_hinges import with_slack_hinges
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.expressions import Scalar, scalar
 
 
 @dataclass
@@ -74,10 +74,12 @@ def evaluate(
         shift_pivots: Whether pivots are shifted by the `pivot_shift` in the workspace.
     """
     unknowns, layout = plan.unknowns, plan.layout
-    chain = unknowns.chain
-    unknown: Sequence[Scalar] = unknowns.rest if at_rest else block.loads(layout.unknown, layout.unknowns)
-    elements = [unknowns.traced(row, block.load, lambda place: unknown[place]) for row in range(len(chain.elements))]
-    elements = with_slack_hinges(unknowns, elements)
+    chain = plan.numbers_in(block)
+    at_start = [scalar(chain.rest[strain]) for strain in unknowns.strains]
+    unknown: Sequence[Scalar] = at_start if at_rest else block.loads(layout.unknown, layout.unknowns)
+    rows = range(len(chain.elements))
+    elements = [unknowns.traced(row, block.load, lambda place: unknown[place], chain) for row in rows]
+    elements = with_slack_hinges(unknowns, elements, chain)
     leading = unknowns.leading_motors
     base_axes, base = place_base(elements[:leading])
     force = constants(np.zeros(3)) if forceless else base_axes.T @ vector(block.loads(layout.force, 3))

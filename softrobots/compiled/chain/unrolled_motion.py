@@ -24,9 +24,9 @@ from softrobots.compiled.chain.elements import Vector, constants, cross, turned,
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.recursion import TracedElement
 from softrobots.compiled.chain.slack_hinges import with_slack_hinges
-from softrobots.compiled.chain.unknowns import bodies_of
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
+from softrobots.model.serial_chain import bodies_of
 
 _UP = constants([0.0, 0.0, 1.0])
 
@@ -55,7 +55,7 @@ def joints_of(plan: MotionPlan, block: Block) -> list[_Joint]:
     rows = range(len(unknowns.chain.elements))
     traced = [unknowns.traced(row, block.load, lambda place: block.load(layout.unknown + place)) for row in rows]
     joints = []
-    for element, given in zip(with_slack_hinges(unknowns, traced), unknowns.chain.elements, strict=True):
+    for element, given in zip(with_slack_hinges(unknowns, traced, unknowns.chain), unknowns.chain.elements, strict=True):
         (body,) = bodies_of(given)
         inertia = CompositeBody(float(body.mass), constants(body.first_moment), constants(body.inertia))
         axes, origin = element.rotation, element.translation

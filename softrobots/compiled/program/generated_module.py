@@ -13,6 +13,7 @@ import numpy as np
 
 from softrobots.compiled import settings
 from softrobots.compiled.chain.layout import Layout, TipLayout
+from softrobots.compiled.chain.numbers import NumberInputs
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import equilibrium_drivers as drivers
@@ -20,6 +21,7 @@ from softrobots.compiled.drivers import lane_drivers, motor_drivers, muscle_driv
 from softrobots.compiled.program.looped_program import looped_program
 from softrobots.compiled.program.manual import manual
 from softrobots.compiled.program.motor_program import force_blocks, target_blocks
+from softrobots.compiled.program.response_program import ResponsePlaces, response_blocks, response_functions
 from softrobots.compiled.program.unrolled_program import equilibrium_blocks
 from softrobots.compiled.statuses import Status
 from softrobots.compiled.trace.blocks import Block
@@ -41,11 +43,20 @@ class Program:
     """Places of the response of the tip; None for unrolled chains, which have searches of their own."""
     entry_points: tuple[str, ...]
     """Functions that solve a case, and constants that their callers need."""
+    responses: ResponsePlaces | None = None
+    """Places of rates and weights of derivatives; None in code without them."""
 
 
-def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False) -> Program:
-    """Generate the code of a robot; `weight`: whether there is gravity; `poses`: whether targets of the tip are poses."""
-    plan = Plan(unknowns, weight, poses)
+def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False, inputs: NumberInputs | None = None) -> Program:
+    """Generate the code of a robot.
+
+    Args:
+        unknowns: The robot.
+        weight: Whether there is gravity.
+        poses: Whether targets of the tip are poses.
+        inputs: Numbers of the robot that are inputs, of code with derivatives, for unrolled chains.
+    """
+    plan = Plan(unknowns, weight, poses, inputs=inputs)
     layout = plan.layout
     functions, lane_functions = functions_of(drivers), functions_of(lane_drivers)
     tables: dict[str, object] = {}
@@ -73,10 +84,19 @@ def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False) -> Pr
         functions += functions_of(motor_drivers) + functions_of(path_drivers)
     else:
         lane_functions = [one for one in lane_functions if one not in lane_drivers.MOTOR_FUNCTIONS]
+    responses = None
+    if inputs is not None:
+        responses = ResponsePlaces(size, layout.motors, layout.unknowns, inputs.count)
+        lane_size = size = responses.end
+        tables |= {"NUMBER_WEIGHTS": responses.number}
+        blocks_of_responses = response_blocks(plan, responses)
+        blocks, lanes = blocks + blocks_of_responses, lanes + blocks_of_responses
+        lane_loops += response_functions(blocks_of_responses)
     docstring, places = manual(plan, tip)
     names += [*places, *Status.__members__]
     text = module_text(docstring, _constants(unknowns, layout, size, lane_size, tables), blocks, loops, functions)
-    return Program(text, lane_text(lanes, lane_loops, lane_functions), layout, size, tip, (*entries, *names))
+    lane_part = lane_text(lanes, lane_loops, lane_functions)
+    return Program(text, lane_part, layout, size, tip, (*entries, *names), responses)
 
 
 def module_text(

@@ -28,6 +28,9 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import MissingDependency, OutputError
 from softrobots.core.files import write_text
 
+RESPONSES = tuple(f"{way}_{kind}_batch" for way in ("pull", "push") for kind in ("equilibrium", "estimate"))
+"""Batch functions of derivatives; see `softrobots.compiled.program.response_program`."""
+
 BACKENDS = ("numba", "python")
 """Names of the back ends, the preferred one first."""
 
@@ -66,7 +69,7 @@ class Run:
         """Look up the functions; those that the program lacks are None."""
         self.program, self.layout = program, program.layout
         single, motion = ("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip"), ("motion_step", "motion_run")
-        batches = ("settle_batch", "estimate_batch", "reach_batch", "motion_batch")
+        batches = ("settle_batch", "estimate_batch", "reach_batch", "motion_batch", *RESPONSES)
         for name in (*single, *motion, "place_at", *batches):
             setattr(self, name, getattr(functions, name, None))
 

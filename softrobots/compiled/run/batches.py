@@ -8,11 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.compiled.settings import CHUNK
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import LARGEST, FloatArray, finite_array, positive_integer
 from softrobots.core.errors import ParameterError
-
-_CHUNK = 8192  # cases that a thread takes at a time; small, as another program may slow one thread down
 
 
 def batch_rows(**arrays: tuple[Any, int]) -> list[FloatArray]:
@@ -124,6 +123,7 @@ def solve_batch(
     results: Sequence[tuple[int, int]],
     count: int,
     threads: int,
+    sums: FloatArray | None = None,
 ) -> tuple[list[FloatArray], Any]:
     """Solve many cases with a batch function of generated code; see `softrobots.compiled.drivers.lane_drivers`.
 
@@ -133,9 +133,10 @@ def solve_batch(
         results: Place in the workspace and number of columns of each result.
         count: Number of cases.
         threads: Number of threads.
+        sums: For functions of `response_drivers`, zeros to add to instead of writing statuses, a row for each chunk of cases.
 
     Returns:
-        The results, shape (count, columns) each, and the status of each case, shape (count,).
+        The results, shape (count, columns) each, and the status of each case, shape (count,), or the sums.
 
     Raises:
         ParameterError: If the number of threads is not positive.
@@ -144,17 +145,18 @@ def solve_batch(
     given = tuple(array if array.flags.writeable else array.copy() for array in arrays)  # all of one type for numba
     places, result_places = tuple(place for place, _ in inputs), tuple(place for place, _ in results)
     outputs, statuses = tuple(np.zeros((count, columns)) for _, columns in results), np.zeros(count, dtype=np.uint8)
+    written = statuses if sums is None else sums
 
     def solve(first: int, last: int) -> None:
-        function(given, places, outputs, result_places, statuses, first, last)
+        function(given, places, outputs, result_places, written, first, last)
 
-    if positive_integer("threads", threads) == 1 or count <= _CHUNK:
+    if positive_integer("threads", threads) == 1 or count <= CHUNK:
         solve(0, count)
     else:
-        starts = range(0, count, _CHUNK)
+        starts = range(0, count, CHUNK)
         with ThreadPoolExecutor(threads) as pool:
             list(pool.map(solve, starts, [*starts[1:], count]))
-    return list(outputs), statuses
+    return list(outputs), written
 
 
 def root(squares: FloatArray) -> FloatArray:

@@ -18,6 +18,11 @@ COMMUTATIVE = ("+", "*")
 """Commutative operations."""
 
 
+def scalar(value: Any) -> Scalar:
+    """Return an expression as it is, and any other number as a plain float."""
+    return value if isinstance(value, Expression) else float(value)
+
+
 class Trace:
     """Expressions of one piece of code."""
 
@@ -200,17 +205,33 @@ def in_order(roots: Sequence[Scalar]) -> list[Expression]:
 
 
 def gradient(value: Scalar, variables: Sequence[Expression]) -> list[Scalar]:
-    """Return the derivatives of an expression with respect to expressions below it (reverse accumulation)."""
+    """Return the derivatives of an expression with respect to expressions below it."""
+    return pull_back([value], [1.0], variables)
+
+
+def pull_back(values: Sequence[Scalar], weights: Sequence[Scalar], variables: Sequence[Expression]) -> list[Scalar]:
+    """Return the derivatives of the weighted sum of values by expressions below them, at constant weights (reverse mode)."""
     slopes: dict[int, Scalar] = {}
-    if isinstance(value, Expression):
-        slopes[value.number] = 1.0
-        kept = {one.number for one in variables}
-        for expression in reversed(in_order([value])):
-            slope = slopes.get(expression.number, 0.0)
-            if expression.number not in kept and not (isinstance(slope, float) and slope == 0.0):
-                for one, share in _shares(expression):
-                    slopes[one.number] = slopes.get(one.number, 0.0) + slope * share
+    for value, weight in zip(values, weights, strict=True):
+        if isinstance(value, Expression):
+            slopes[value.number] = slopes.get(value.number, 0.0) + weight
+    kept = {one.number for one in variables}
+    for expression in reversed(in_order(values)):
+        slope = slopes.get(expression.number, 0.0)
+        if expression.number not in kept and not (isinstance(slope, float) and slope == 0.0):
+            for one, share in _shares(expression):
+                slopes[one.number] = slopes.get(one.number, 0.0) + slope * share
     return [slopes.get(one.number, 0.0) for one in variables]
+
+
+def push_forward(values: Sequence[Scalar], variables: Sequence[Expression], rates: Sequence[Scalar]) -> list[Scalar]:
+    """Return the rates of change of values from those of expressions below them (forward mode)."""
+    known: dict[int, Scalar] = {one.number: rate for one, rate in zip(variables, rates, strict=True)}
+    for expression in in_order(values):
+        if expression.number not in known:
+            shares = _shares(expression)
+            known[expression.number] = sum((share * known[one.number] for one, share in shares), 0.0)  # type: ignore[misc]
+    return [known[one.number] if isinstance(one, Expression) else 0.0 for one in values]
 
 
 def _shares(expression: Expression) -> list[tuple[Expression, Scalar]]:

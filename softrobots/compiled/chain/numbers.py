@@ -1,0 +1,99 @@
+"""The numbers of a chain on which its statics depends, and those of them that are inputs of generated code.
+
+Numbers that are not 0, 1 or -1 are inputs, so that one code serves all robots of a structure, whatever their parameters.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.trace.expressions import Scalar
+from softrobots.core.checks import FloatArray
+from softrobots.model.serial_chain import ChainBody, ChainJoint, Element, SerialChain
+
+
+def numbers_of(chain: SerialChain) -> FloatArray:
+    """Return all numbers of joints and links on which equilibria depend, flat, in the order of `with_numbers`."""
+    parts: list[FloatArray] = []
+
+    def collect(values: Any) -> Any:
+        parts.append(np.asarray(values, dtype=np.float64).ravel())
+        return values
+
+    _mapped(chain, collect)
+    return np.concatenate(parts)
+
+
+def with_numbers(chain: SerialChain, numbers: Sequence[Any]) -> SerialChain:
+    """Return the chain with other numbers, floats or expressions."""
+    left = iter(numbers)
+
+    def put(values: Any) -> Any:
+        shape = np.shape(values)
+        changed = np.zeros(shape, dtype=object)
+        for index in np.ndindex(*shape):
+            changed[index] = next(left)
+        return changed if shape else changed.item()
+
+    return _mapped(chain, put)
+
+
+def _mapped(chain: SerialChain, change: Callable[[Any], Any]) -> SerialChain:
+    """Return the chain with every array or number that counts changed; masses last, which count under gravity only."""
+    elements: list[Element] = [
+        replace(one, rotation=change(one.rotation), translation=change(one.translation)) for one in chain.elements
+    ]
+    hinges = tuple((inner, outer, change(moment)) for inner, outer, moment in chain.slack_hinges)
+    changed = replace(
+        chain,
+        slack_hinges=hinges,
+        tip_translation=change(chain.tip_translation),
+        stiffness=change(chain.stiffness),
+        rest=change(chain.rest),
+    )
+    for row, one in enumerate(elements):
+        if isinstance(one, ChainJoint):
+            elements[row] = replace(one, body=_weighed(one.body, change))
+        else:
+            bodies = tuple(_weighed(body, change) for body in one.bodies)
+            elements[row] = replace(one, length=change(one.length), bodies=bodies)
+    return replace(changed, elements=tuple(elements))
+
+
+def _weighed(body: ChainBody, change: Callable[[Any], Any]) -> ChainBody:
+    return body._replace(mass=change(body.mass), first_moment=change(body.first_moment))
+
+
+@dataclass(frozen=True, eq=False)
+class NumberInputs:
+    """The numbers of a chain that are inputs of its code."""
+
+    constant: FloatArray
+    """All numbers of the chain that the code was made for, shape (n,)."""
+    varied: Any
+    """Mask of those that are inputs, shape (n,)."""
+
+    @classmethod
+    def of(cls, chain: SerialChain, others: Sequence[SerialChain] = ()) -> NumberInputs:
+        """Choose the numbers that are not 0, 1 or -1, or differ in other robots of the same structure."""
+        constant = numbers_of(chain)
+        varied = ~np.isin(constant, (0.0, 1.0, -1.0))
+        for other in others:
+            varied |= numbers_of(other) != constant
+        return cls(constant, varied)
+
+    @cached_property
+    def count(self) -> int:
+        """Number of inputs."""
+        return int(self.varied.sum())
+
+    def traced(self, chain: SerialChain, inputs: Sequence[Scalar]) -> SerialChain:
+        """Return the chain with expressions instead of the inputs."""
+        left = iter(inputs)
+        numbers = [next(left) if varied else value for value, varied in zip(self.constant.tolist(), self.varied, strict=True)]
+        return with_numbers(chain, numbers)

@@ -1,0 +1,24 @@
+"""Derivatives of many cases side by side, in blocks of lanes; the text goes into generated modules once for each response."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+from softrobots.compiled.drivers.generated_names import *
+from softrobots.compiled.drivers.intrinsics import Array, zeros
+from softrobots.compiled.drivers.lane_drivers import Places, Rows, load_block, store_block
+
+respond_lanes: Callable[[Array], None]
+
+
+def respond_batch(inputs: Rows, places: Places, outputs: Rows, result_places: Places, sums: Any, first: int, last: int) -> None:
+    """Compute rates or weights; add the weights of the numbers of the robot to row `first // CHUNK` of the sums."""
+    lanes = zeros(LANE_SIZE * LANES)
+    for begin in range(first, last, LANES):
+        load_block(lanes, inputs, places, begin, last)
+        respond_lanes(lanes)
+        store_block(lanes, outputs, result_places, begin, last)
+        for j in range(sums.shape[1]):
+            for lane in range(min(LANES, last - begin)):
+                sums[first // CHUNK, j] += lanes[(NUMBER_WEIGHTS + j) * LANES + lane]
