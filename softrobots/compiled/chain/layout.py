@@ -35,8 +35,8 @@ torque that the force does not explain; squared smallest singular value of the e
 [m]; largest distance from a target [m]; number of steps."""
 
 
-_COUNTS = ("unknowns", "conditions", "muscles", "constraints", "inputs")
-_COUNTS += ("singles", "numbers", "prepared")  # no places for callers
+# No places for callers.
+_COUNTS = ("unknowns", "conditions", "muscles", "constraints", "inputs", "singles", "numbers", "prepared")
 
 
 def assign_places(layout: Any, first: int, **sizes: int) -> None:

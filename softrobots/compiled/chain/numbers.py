@@ -78,15 +78,6 @@ class NumberInputs:
     varied: Any
     """Mask of those that are inputs, shape (n,)."""
 
-    @classmethod
-    def of(cls, chain: SerialChain, others: Sequence[SerialChain] = ()) -> NumberInputs:
-        """Choose the numbers that are not 0, 1 or -1, or differ in other robots of the same structure."""
-        constant = numbers_of(chain)
-        varied = ~np.isin(constant, (0.0, 1.0, -1.0))
-        for other in others:
-            varied |= numbers_of(other) != constant
-        return cls(constant, varied)
-
     @cached_property
     def count(self) -> int:
         """Number of inputs."""

@@ -281,4 +281,3 @@ class Unknowns:
         return frozenset(
             element.strain + row for element in self.chain.elements if isinstance(element, ChainSection) for row in rows
         )
-

@@ -29,6 +29,7 @@ TARGET_SIZE: int
 N_ERRORS: int
 LANES: int
 LANE_SIZE: int
+NUMBER_WEIGHTS: int
 WORKSPACE_SIZE: int
 
 # Places in the workspace, see `softrobots.compiled.chain.layout`.
@@ -117,6 +118,7 @@ newton_pass: Callable[[Array], None]
 newton_pass_lanes: Callable[[Array], None]
 prepare: Callable[[Array], None]
 prepare_force: Callable[[Array], None]
+respond_lanes: Callable[[Array], None]
 target_pass_lanes: Callable[[Array], None]
 target_step: Callable[[Array], None]
 

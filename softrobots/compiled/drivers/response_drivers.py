@@ -2,14 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
 from softrobots.compiled.drivers.generated_names import *
-from softrobots.compiled.drivers.intrinsics import Array, zeros
+from softrobots.compiled.drivers.intrinsics import zeros
 from softrobots.compiled.drivers.lane_drivers import Places, Rows, load_block, store_block
-
-respond_lanes: Callable[[Array], None]
+from softrobots.compiled.settings import *
 
 
 def respond_batch(inputs: Rows, places: Places, outputs: Rows, result_places: Places, sums: Any, first: int, last: int) -> None:

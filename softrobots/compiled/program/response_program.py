@@ -66,6 +66,15 @@ class ResponsePlaces:
         return self.unknowns + 6
 
     @property
+    def of_results(self) -> tuple[int, int, int]:
+        """Places of unknowns, tip and force."""
+        return self.result, self.result + self.unknowns, self.result + self.unknowns + 3
+
+    def load(self, kind: str) -> tuple[int, int]:
+        """Return place behind the first, and size, of the load of an "equilibrium" or of an "estimate": force or torques."""
+        return (self.motors, 3) if kind == "equilibrium" else (self.motors + 3, self.motors)
+
+    @property
     def end(self) -> int:
         """The first place behind."""
         return self.result + self.results

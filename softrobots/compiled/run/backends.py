@@ -13,7 +13,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Callable
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -110,6 +110,9 @@ class PythonRun(Run):
         batches = NumpyBatches(module, vectorised, program)
         for name in ("settle_batch", "estimate_batch", "reach_batch"):
             setattr(self, name, getattr(batches, name))
+        if program.responses is not None:
+            for name in RESPONSES:
+                setattr(self, name, partial(batches.respond_batch, name.removesuffix("_batch")))
 
     def array(self, count: int) -> Any:
         """Return a list of zeros."""

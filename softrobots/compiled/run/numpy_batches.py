@@ -14,7 +14,7 @@ import numpy as np
 
 from softrobots.compiled.drivers.lane_drivers import Places, Rows
 from softrobots.compiled.program.generated_module import Program
-from softrobots.compiled.settings import FORCE_PASSES, OBSERVABLE, PASSES
+from softrobots.compiled.settings import CHUNK, FORCE_PASSES, OBSERVABLE, PASSES
 from softrobots.compiled.statuses import Status
 
 BLOCK = 4096
@@ -54,6 +54,16 @@ class NumpyBatches:
                 for place, values in given.items():
                     w[place][lane] = values[lane]
                 statuses[lane] = self._alone(w, lane, self._module.reach)
+
+    def respond_batch(self, name: str, *batch: Any) -> None:
+        """Compute rates or weights by a straight-line function; see `response_drivers`."""
+        *given, sums, first, last = batch
+        unused: Any = np.zeros(last)
+        for w, _, _ in self._blocks(*(*given, unused, first, last)):
+            getattr(self._vectorised, name)(w)
+            count = np.size(w[0])
+            weights = w[self._module.NUMBER_WEIGHTS :][: sums.shape[1]]
+            sums[first // CHUNK] += [np.sum(np.broadcast_to(one, count)) for one in weights]
 
     def _blocks(
         self, inputs: Rows, places: Places, outputs: Rows, result_places: Places, statuses: Any, first: int, last: int

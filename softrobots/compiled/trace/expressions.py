@@ -230,7 +230,7 @@ def push_forward(values: Sequence[Scalar], variables: Sequence[Expression], rate
     for expression in in_order(values):
         if expression.number not in known:
             shares = _shares(expression)
-            known[expression.number] = sum((share * known[one.number] for one, share in shares), 0.0)  # type: ignore[misc]
+            known[expression.number] = sum((share * known[one.number] for one, share in shares), 0.0)
     return [known[one.number] if isinstance(one, Expression) else 0.0 for one in values]
 
 

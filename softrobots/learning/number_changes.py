@@ -1,0 +1,92 @@
+r"""Numbers of the compiled code of a robot at given parameters, and their derivatives by the parameters.
+
+Derivatives are central differences of the numbers of robots with other values, at :math:`p \pm h` with `h` of 1e-5 of the
+parameter, exact to 1e-10; at a bound they are one-sided, of second order. They are taken once for each new value of the
+parameters, not for each case.
+"""
+
+from __future__ import annotations
+
+from functools import lru_cache
+
+import numpy as np
+
+from softrobots.compiled.chain.numbers import NumberInputs, numbers_of
+from softrobots.compiled.run.responses import Responses
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError, SoftRobotsError
+from softrobots.identification.parameters import ParameterSet
+
+_STEP = 1e-5  # relative to the parameter; of a parameter that is zero, absolute
+_STENCILS = (((-1.0, -0.5), (1.0, 0.5)), ((0.0, -1.5), (1.0, 2.0), (2.0, -0.5)), ((0.0, 1.5), (-1.0, -2.0), (-2.0, 0.5)))
+
+
+class NumberChanges:
+    """Numbers of a robot by its parameters, and the compiled code that takes them."""
+
+    def __init__(self, parameters: ParameterSet, backend: str, *, weight: bool) -> None:
+        """Generate the code.
+
+        Raises:
+            ParameterError: If derivatives of the robot are not compiled.
+        """
+        self._parameters, self._backend, self._weight = parameters, backend, weight
+        self._chain = parameters.present.chain()
+        self.numbers, self.slopes = lru_cache(maxsize=16)(self._numbers), lru_cache(maxsize=4)(self._slopes)
+        present = tuple(parameters.values.tolist())
+        constant = numbers_of(self._chain)
+        self._inputs = NumberInputs(constant, ~np.isin(constant, (0.0, 1.0, -1.0)) | np.any(self.slopes(present), axis=1))
+        self._responses = Responses(self._chain, backend, self._inputs, weight=weight)
+
+    def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[Responses, FloatArray, FloatArray]:
+        """Return code that takes the numbers at values of the parameters; it is made anew if other numbers vary there.
+
+        Args:
+            values: The values, P of them.
+            slopes: Whether the derivatives of the numbers are needed.
+
+        Returns:
+            The code, its numbers, shape (1, k), and their derivatives, shape (k, P), empty if not needed.
+
+        Raises:
+            ParameterError: If the robot refuses the values, or has other joints with them.
+            DescriptionError: If the robot cannot be described with them.
+        """
+        numbers = self.numbers(values)
+        by_parameter = self.slopes(values) if slopes else np.zeros((len(numbers), 0))
+        varied = self._inputs.varied | (numbers != self._inputs.constant) | np.any(by_parameter, axis=1)
+        if np.any(varied != self._inputs.varied):
+            self._inputs = NumberInputs(self._inputs.constant, varied)
+            self._responses = Responses(self._chain, self._backend, self._inputs, weight=self._weight)
+        return self._responses, numbers[None, varied], by_parameter[varied]
+
+    def _numbers(self, values: tuple[float, ...]) -> FloatArray:
+        """Return the numbers at values of the parameters, shape (n,)."""
+        chain = self._parameters.model(values).chain() if np.any(self._parameters.of_model) else self._chain
+        numbers = numbers_of(chain)
+        if [one.name for one in chain.elements] != [one.name for one in self._chain.elements]:
+            raise ParameterError("parameters", values, "values with which the robot has the same joints")
+        return numbers
+
+    def _slopes(self, values: tuple[float, ...]) -> FloatArray:
+        """Return the derivatives of the numbers by the parameters, shape (n, P); zero of those that do not change the model."""
+        slopes = np.zeros((len(numbers_of(self._chain)), len(values)))
+        for column in np.flatnonzero(self._parameters.of_model):
+            for stencil in _STENCILS:
+                try:
+                    slopes[:, column] = self._difference(np.array(values), int(column), stencil)
+                except SoftRobotsError:  # beyond a bound
+                    if stencil is _STENCILS[-1]:
+                        raise
+                else:
+                    break
+        return slopes
+
+    def _difference(self, values: FloatArray, column: int, stencil: tuple[tuple[float, float], ...]) -> FloatArray:
+        step = _STEP * (abs(values[column]) or 1.0)
+        total = np.zeros(len(numbers_of(self._chain)))
+        for place, factor in stencil:
+            other = values.copy()
+            other[column] += place * step
+            total += self._numbers(tuple(other.tolist())) * (factor / step)
+        return total
