@@ -1,5 +1,6 @@
 """Soft robots as rigid-body robot descriptions, with certified statics and inverse kinematics on Pinocchio."""
 
+import importlib
 from typing import TYPE_CHECKING, Any
 
 import softrobots.dynamics.saved_modes
@@ -150,7 +151,9 @@ __all__ = [
 
 
 def __getattr__(name: str) -> Any:
-    """Import the compiled solvers when they are asked for: a fifth of all other imports."""
+    """Import the compiled solvers, a fifth of all other imports, and functions of JAX and PyTorch when they are asked for."""
+    if name in ("jax", "torch"):
+        return importlib.import_module(f"softrobots.{name}")
     if name != "compile":
         raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
     from softrobots.compiled.run.compiled_model import compile_model

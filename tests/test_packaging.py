@@ -28,7 +28,7 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
     assert "pinocchio" in loaded
     heavy = {"yourdfpy", "meshcat", "matplotlib", "numba", "scipy", "trimesh", "xacro", "tornado", "tqdm"}
     heavy |= {"mujoco", "pydrake", "pybullet", "urchin", "ikpy", "roboticstoolbox", "viser", "distributed", "dask"}
-    heavy |= {"playwright", "PIL", "shtab", "IPython", "example_robot_data", "control"}
+    heavy |= {"playwright", "PIL", "shtab", "IPython", "example_robot_data", "control", "jax", "torch"}
     assert not loaded & (heavy | {"urllib.request"})  # brings http, ssl and email along, an eighth of the whole
 
 
@@ -50,7 +50,7 @@ with_springs
 
 def test_the_public_names_are_these_and_exist() -> None:
     assert sr.__all__ == PUBLIC.split()
-    for name in (*sr.__all__, "compile"):
+    for name in (*sr.__all__, "compile", "jax", "torch"):
         assert getattr(sr, name) is not None
 
 
@@ -97,6 +97,9 @@ ROOMS = {
     "dynamics": "core constant_curvature model statics",
     "identification": "core inflated_beam constant_curvature description robots model statics dynamics",
     "compiled": "core inflated_beam constant_curvature description model statics dynamics identification",
+    "learning": "core model statics identification compiled",
+    "jax": "core learning",
+    "torch": "core learning",
     "export": "core inflated_beam constant_curvature description robots model",
     "view": "core inflated_beam constant_curvature helix description robots model statics dynamics identification",
     "cli": "core inflated_beam constant_curvature helix description robots model statics dynamics identification compiled"
@@ -348,7 +351,7 @@ def test_dev_holds_every_extra() -> None:
     text = (CHECKOUT / "pyproject.toml").read_text(encoding="utf-8")
     named = re.search(r'"softrobots\[([\w,-]+)\]"', text)
     assert named is not None
-    assert set(named[1].split(",")) == set(extras()) - {"dev"}
+    assert set(named[1].split(",")) == set(extras()) - {"dev", "torch"}  # PyTorch of PyPI has gigabytes
 
 
 def test_dev_installs_the_tools_of_the_gate() -> None:

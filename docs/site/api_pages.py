@@ -118,6 +118,11 @@ PAGES = {
             *_top("compiled.sweeps"),
         ),
     ),
+    "learning": ApiPage(
+        "jax and torch",
+        "Equilibria and load estimates as functions of JAX and PyTorch, with derivatives (extras `jax`, `torch`).",
+        tuple(f"softrobots.{name}.{function}" for name in ("jax", "torch") for function in ("equilibrium", "load_estimate")),
+    ),
     "viewer": ApiPage(
         "Viewer",
         "The robot in a browser: as a page on loopback, as a file of its own, with sliders, or following commands.",

@@ -11,8 +11,8 @@ from functools import lru_cache
 
 import numpy as np
 
-from softrobots.compiled.chain.numbers import NumberInputs, numbers_of
 from softrobots.compiled.run.responses import Responses
+from softrobots.compiled.trace.numbers import NumberInputs, numbers_of
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError, SoftRobotsError
 from softrobots.identification.parameters import ParameterSet

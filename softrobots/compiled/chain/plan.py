@@ -8,11 +8,11 @@ from functools import cached_property
 from softrobots.compiled.chain.elements import symmetric, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
-from softrobots.compiled.chain.numbers import NumberInputs
 from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Expression
+from softrobots.compiled.trace.numbers import NumberInputs
 from softrobots.model.serial_chain import SerialChain
 
 

@@ -30,7 +30,7 @@ def _laws(inner: Scalar, outer: Scalar, stiffness: Scalar, slack_moment: Scalar)
     square = larger(inner * inner + outer * outer, first * first)
     ratio = square_root(square) * (1.0 / first)
     start = inverse_cube_root(ratio)
-    moment, tangent, energy, _ = softening(ratio, start, square_root(larger(1.0 - start, 0.0)))
+    moment, tangent, energy, _ = softening(ratio, start, square_root(larger(1.0 - start, 1e-300)))  # its slope is finite
     taut = (inner * inner + outer * outer) * (0.5 * stiffness)
     secant = if_less(1.0, ratio, moment / ratio * stiffness, stiffness)
     bending = if_less(1.0, ratio, (tangent * stiffness - secant) / square, 0.0)

@@ -13,7 +13,6 @@ import numpy as np
 
 from softrobots.compiled import settings
 from softrobots.compiled.chain.layout import Layout, TipLayout
-from softrobots.compiled.chain.numbers import NumberInputs
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import equilibrium_drivers as drivers
@@ -25,6 +24,7 @@ from softrobots.compiled.program.response_program import ResponsePlaces, respons
 from softrobots.compiled.program.unrolled_program import equilibrium_blocks
 from softrobots.compiled.statuses import Status
 from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.numbers import NumberInputs
 
 
 @dataclass(frozen=True)

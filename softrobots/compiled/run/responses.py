@@ -7,13 +7,13 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.numbers import NumberInputs
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import make_program
 from softrobots.compiled.program.response_program import ResponsePlaces
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import root, solve_batch
 from softrobots.compiled.settings import CHUNK, MAX_UNROLLED_JOINTS
+from softrobots.compiled.trace.numbers import NumberInputs
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.model.serial_chain import SerialChain

@@ -1,0 +1,161 @@
+"""Derivatives of compiled equilibria and load estimates: differences of robots that Pinocchio solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.core.checks import FloatArray
+from softrobots.learning.differentiable import Differentiable
+
+DOWN = (0.0, 0.0, -9.81)
+OPTIONS: dict[str, Any] = dict(backend="python", threads=1, failed="raise")
+STEP = 1e-3
+"""Of differences of fourth order, relative to the numbers; their error is about its fourth power."""
+TOLERANCE = 1e-8
+ROBOTS: dict[str, tuple[sr.InflatableArm, dict[str, float], Any]] = {
+    "paper": (sr.InflatableArm(payload=0.3), {"stiffness": 180.0, "hinge_offset": 0.03, "wall_thickness": 4e-4}, DOWN),
+    "weightless": (sr.InflatableArm(), {"stiffness": 180.0, "rest_up": 0.1}, None),
+    "two hinges": (sr.InflatableArm(link_model="two_hinges", torsion=True), {"radius": 0.05, "density": 1300.0}, DOWN),
+    "slack wall": (
+        sr.InflatableArm(link_model="two_hinges", moment_law="slack_wall", pressure=3e4),
+        {"pressure": 3e4, "radius": 0.05},
+        DOWN,
+    ),
+    "wrist": (sr.InflatableArm(wrist=(0.05, 0.1)), {"stiffness": 180.0, "hinge_offset": 0.03}, DOWN),
+}
+"""A robot, values of its parameters, and gravity."""
+
+
+def differences(solve: Callable[[FloatArray], FloatArray], at: FloatArray) -> FloatArray:
+    """Differences of fourth order by each number, shape (results, numbers)."""
+    columns = []
+    for place, value in enumerate(at):
+        step = np.zeros(len(at))
+        step[place] = STEP * (abs(value) or 1.0)
+        near, far = solve(at + step) - solve(at - step), solve(at + 2.0 * step) - solve(at - 2.0 * step)
+        columns.append((8.0 * near - far) / (12.0 * step[place]))
+    return np.array(columns).T
+
+
+def check(solver: Differentiable, inputs: list[FloatArray], solve: Callable[..., FloatArray], error: float = 1e-10) -> None:
+    """Compare both modes with differences, by numbers relative to their size; a second case makes it a batch.
+
+    `error` is that of what is solved: of equilibria 1e-12 of their load.
+    """
+    tolerance = max(TOLERANCE, error / STEP)
+    sizes = np.concatenate([np.where(one == 0.0, 1.0, np.abs(one)) for one in inputs])
+    ends = np.cumsum([len(one) for one in inputs])[:-1]
+    slopes = differences(lambda x: solve(*np.split(x, ends)), np.concatenate(inputs)) * sizes
+    scale = np.abs(slopes).max()
+    rows = [np.stack([inputs[0], 0.5 * inputs[0]]), inputs[1], inputs[2]]
+    results = solver.solve(*rows)
+    assert np.concatenate([one[0] for one in results]) == pytest.approx(solve(*inputs), abs=10.0 * error)
+    random = np.random.default_rng(7)
+    rates = random.normal(size=len(sizes))
+    pushed = solver.push(rows, results, np.split(rates * sizes, ends))
+    assert np.concatenate([one[0] for one in pushed]) == pytest.approx(slopes @ rates, abs=tolerance * scale)
+    weights = [np.array([random.normal(size=one.shape[1]), np.zeros(one.shape[1])]) for one in results]
+    shapes: list[tuple[int, ...]] = [(2,), (2,), ()]
+    pulled = solver.pull(rows, results, weights, shapes)
+    own = np.concatenate([one if one.ndim == 1 else one[0] for one in map(np.asarray, pulled)]) * sizes
+    assert own == pytest.approx(np.concatenate([one[0] for one in weights]) @ slopes, abs=tolerance * scale)
+    # The sums over a batch are those of both cases: forward and reverse mode are transposes of each other.
+    weights = [random.normal(size=one.shape) for one in results]
+    pulled = solver.pull(rows, results, weights, [(2,), (), ()])
+    forward = sum(float((a * b).sum()) for a, b in zip(weights, pushed, strict=True))
+    parts = zip(pulled, np.split(rates * sizes, ends), strict=True)
+    assert forward == pytest.approx(sum(float((np.asarray(a) * b).sum()) for a, b in parts), rel=1e-11)
+
+
+@pytest.mark.parametrize(
+    "name", [pytest.param(one, marks=[] if one in ("paper", "slack wall") else pytest.mark.study) for one in ROBOTS]
+)
+def test_derivatives_of_equilibria_are_differences_of_solved_robots(name: str) -> None:
+    """By motors, force and parameters of the robot, in both modes."""
+    robot, values, gravity = ROBOTS[name]
+    solver = Differentiable("equilibrium", replace(robot, **values), list(values), gravity=gravity, **OPTIONS)
+
+    def solve(motors: FloatArray, force: FloatArray, parameters: FloatArray) -> FloatArray:
+        model = sr.load_model(replace(robot, **dict(zip(values, parameters.tolist(), strict=True))))
+        found = sr.solve_equilibrium(model, motors, force, gravity=gravity)
+        return np.concatenate([found.q_springs, found.tip_position])
+
+    motors = np.array([0.4, 0.7, -0.8, 0.3, -0.5, 0.2])[: solver.model.n_motors]
+    check(solver, [motors, np.array([2.0, 4.0, -5.0]), np.array(list(values.values()))], solve)
+
+
+@pytest.mark.parametrize("name", ["paper", pytest.param("wrist", marks=pytest.mark.study)])
+def test_derivatives_of_load_estimates_are_differences_of_estimates(name: str) -> None:
+    """With three motors, and with six whose torques no force explains: the force is that of least squares."""
+    robot, values, gravity = ROBOTS[name]
+    changed = replace(robot, **values)
+    model = sr.load_model(changed)
+    motors = np.array([0.4, 0.7, -0.8, 0.3, -0.5, 0.2])[: model.n_motors]
+    felt = sr.solve_equilibrium(model, motors, (2.0, 4.0, -5.0), gravity=gravity).motor_torques
+    torques = felt + np.array([0.05, -0.1, 0.08, 0.02, -0.06, 0.1])[: model.n_motors]
+    solver = Differentiable("estimate", changed, list(values), gravity=gravity, **OPTIONS)
+
+    def solve(motors: FloatArray, torques: FloatArray, parameters: FloatArray) -> FloatArray:
+        model = sr.load_model(replace(robot, **dict(zip(values, parameters.tolist(), strict=True))))
+        found = sr.estimate_load(model, motors, torques, gravity=gravity)
+        return np.concatenate([found.equilibrium.q_springs, found.equilibrium.tip_position, found.force])
+
+    # Least squares converge linearly.
+    check(solver, [motors, torques, np.array(list(values.values()))], solve, 1e-10 if name == "paper" else 1e-8)
+
+
+def test_rows_without_a_result_are_named_or_marked() -> None:
+    """A row that fails changes no other; its gradient is zero."""
+    names = ("stiffness", "motor[2].offset")
+    motors, force = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6], [0.7, 0.8, 0.9]]), np.array([1.0, 2.0, -3.0])
+    broken = motors.copy()
+    broken[1, 2] = np.nan
+    strict = Differentiable("equilibrium", sr.InflatableArm(), names, gravity=None, **OPTIONS)
+    with pytest.raises(sr.ParameterError, match=r"rows = \[1\].*finite motors"):
+        strict.solve(broken, force, strict.present)
+    marking = Differentiable("equilibrium", sr.InflatableArm(), names, gravity=None, **(OPTIONS | {"failed": "nan"}))
+    whole, part = marking.solve(motors, force, strict.present), marking.solve(broken, force, strict.present)
+    for a, b in zip(whole, part, strict=True):
+        assert np.isnan(b[1]).all()
+        assert np.array_equal(a[::2], b[::2])
+    weights, inputs = [np.ones((3, 4)), np.ones((3, 3))], [broken, force, strict.present]
+    found = marking.pull(inputs, part, weights, [(3,), (3,), ()])
+    rest = strict.pull(
+        [motors[::2], force, strict.present], [one[::2] for one in whole], [one[::2] for one in weights], [(2,), (2,), ()]
+    )
+    for a, b in zip(found[:2], rest[:2], strict=True):
+        assert np.array_equal(np.asarray(a)[::2], b)
+        assert np.array_equal(np.asarray(a)[1], np.zeros(3))
+    assert found[2] == pytest.approx(np.asarray(rest[2]), rel=1e-13)
+    assert np.isnan(marking.push(inputs, part, [np.ones(3), None, None])[1][1]).all()
+
+
+def test_rows_of_parameters_are_robots_of_their_own() -> None:
+    """Their order and repetition do not matter, and each has the answers of `softrobots.compile` of that robot."""
+    solver = Differentiable("equilibrium", sr.InflatableArm(), "stiffness", gravity=None, **OPTIONS)
+    motors, force = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, 0.6]]), np.array([1.0, 2.0, -3.0])
+    stiffness = np.array([150.0, 200.0, 150.0])[:, None, None]
+    springs, tips = solver.solve(motors, force, stiffness)
+    assert springs.shape == (3, 2, 4)
+    for row, value in enumerate(stiffness.ravel()):
+        batch = sr.compile(sr.load_model(sr.InflatableArm(stiffness=value)), backend="python").equilibria(motors, force)
+        assert springs[row] == pytest.approx(batch.q_springs, abs=1e-14)
+        assert tips[row] == pytest.approx(batch.tip_positions, abs=1e-14)
+
+
+def test_what_has_no_compiled_derivatives_is_refused_by_name() -> None:
+    options = OPTIONS | {"gravity": None}
+    with pytest.raises(sr.ParameterError, match=r"pcc_arm.*without sections and muscles"):
+        Differentiable("equilibrium", sr.PccArm(), (), **options)
+    with pytest.raises(sr.ParameterError, match=r"force.*actuators and loads are arguments of their own"):
+        Differentiable("equilibrium", sr.InflatableArm(), "force", **options)
+    with pytest.raises(sr.NameNotFound, match="stifness"):
+        Differentiable("equilibrium", sr.InflatableArm(), "stifness", **options)
+    with pytest.raises(sr.ParameterError, match="three motors"):
+        Differentiable("estimate", sr.InflatableArm(link_lengths=(0.6,)), (), **options)
