@@ -77,8 +77,9 @@ def run(arguments: argparse.Namespace) -> bool:
         check_page(arguments.docs, NAME)
     with tempfile.TemporaryDirectory(prefix="softrobots_") as folder:
         report = Path(folder) / "report.xml"
-        options = ["-q", "-n", str(arguments.processes), "-m", "shortened", "--all-cases", f"--junitxml={report}"]
-        status = subprocess.run([sys.executable, "-m", "pytest", *options], cwd=CHECKOUT, check=False).returncode
+        options = ["-q", "-n", str(arguments.processes), "--timeout=3600", f"--junitxml={report}"]
+        command = [sys.executable, "-m", "pytest", *options, "-m", "shortened", "--all-cases"]
+        status = subprocess.run(command, cwd=CHECKOUT, check=False).returncode
         if status not in (0, 1) or not report.is_file():  # 0: all passed, 1: some failed; else not all of them ran
             raise sr.OutputError(f"the tests ended early, with status {status}")
         proofs = read_report(report)

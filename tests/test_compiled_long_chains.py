@@ -62,7 +62,7 @@ def forces_of(rng: np.random.Generator, count: int, largest: float) -> np.ndarra
 @pytest.mark.parametrize("gravity", [None, GRAVITY], ids=["weightless", "heavy"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_long_chains_equal_the_pinocchio_path(name: str, gravity: Any, rng: np.random.Generator) -> None:
-    solver, count = compiled(name), 4
+    solver, count = compiled(name), 2
     motors = actuated(solver.model, rng, count)
     forces = forces_of(rng, count, 0.3 if name.startswith("helix") else 6.0)
     found = solver.equilibria(motors, forces, gravity=gravity)

@@ -35,6 +35,8 @@ ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
         sr.mount(sr.InflatableArm(link_lengths=(0.6,)).urdf(), "tip", sr.HelixTube(elastic_sections=6))
     ),
 }
+EITHER = list(zip(ROBOTS, (None, GRAVITY) * len(ROBOTS), strict=False))
+"""Every robot, weightless or heavy in turn: chains of both are compared in test_compiled_long_chains."""
 FEELING = [name for name in ROBOTS if "tensions" not in name]
 
 
@@ -72,8 +74,7 @@ def nearby(model: sr.SoftModel, motors: np.ndarray, rng: np.random.Generator, si
 # --- How the tip follows
 
 
-@pytest.mark.parametrize("gravity", [None, GRAVITY])
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(("name", "gravity"), EITHER)
 def test_jacobian_and_loads_are_those_of_the_pinocchio_path(name: str, gravity: Any, rng: np.random.Generator) -> None:
     """The same equilibrium on both sides: 1e-9 relative leaves room for the condition of the tangent stiffness."""
     model = robot(name)
@@ -206,8 +207,7 @@ def test_bad_input_of_an_estimate() -> None:
 # --- Inverse kinematics
 
 
-@pytest.mark.parametrize("gravity", [None, GRAVITY])
-@pytest.mark.parametrize("name", ROBOTS)
+@pytest.mark.parametrize(("name", "gravity"), EITHER)
 def test_searches_end_where_the_pinocchio_path_ends(name: str, gravity: Any, rng: np.random.Generator) -> None:
     """One search on two engines: the same motors, to what a redundant robot leaves on its way home (1e-6 of a radian)."""
     model, c = robot(name), solver(name)

@@ -119,16 +119,13 @@ def test_committed_urdf_is_what_xacro_generates(name: str) -> None:
         (sr.InflatableArm, {}),
         (sr.InflatableArm, ODD),
         (sr.InflatableArm, ODD_WALLS),
-        (PccArm, {}),
         (PccArm, ODD_PCC),
         (PccArm, ODD_LUMPED),
-        (PccArm, {"chain": "lumped"}),
         (PccArm, ODD_MUSCLES),
-        (TendonArm, {}),
         (TendonArm, ODD_TENDONS),
-        (HelixTube, {}),
         (HelixTube, ODD_TUBE),
         (HelixTube, LUMPED_TUBE),
+        *(pytest.param(kind, {}, marks=pytest.mark.study) for kind in (PccArm, TendonArm, HelixTube)),
     ],
 )
 def test_xacro_command_alone_gives_the_same_urdf(kind: type, parameters: dict) -> None:

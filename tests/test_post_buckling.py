@@ -333,7 +333,7 @@ def test_no_branch_is_lost_at_any_plateau(links: int, cases: int) -> None:
 
 
 @pytest.mark.parametrize(
-    "plateau", [*PLATEAUS[::6], 14.99, *(pytest.param(one, marks=pytest.mark.study) for one in PLATEAUS[3::6])]
+    "plateau", [*PLATEAUS[::12], 14.99, *(pytest.param(one, marks=pytest.mark.study) for one in PLATEAUS[6::12])]
 )
 def test_an_arm_of_two_links_folds_at_its_plateau_as_its_plane_says(plateau: float) -> None:
     """Two hinges in a plane, the first on its plateau M: M = F (0.6 sin a + 0.57 sin(a + b)), k b = F 0.57 sin(a + b)."""
