@@ -45,6 +45,7 @@ def pages() -> list[str]:
         "input_shaping",
         "controllers",
         "measured_arm",
+        "long_proofs",
     ],
 )
 def test_every_slow_proof_is_recorded(name: str) -> None:
