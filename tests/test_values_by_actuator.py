@@ -161,3 +161,15 @@ def test_the_reader_refuses_relaxed_strains_that_are_none() -> None:
     for wrong in ("0 0 0", "0 0 nan 1", "0 0 0 -1", "inf 0 0 1"):
         with pytest.raises(sr.DescriptionError, match=r"relaxed = .*a positive stretch"):
             sr.load_model(text.replace('relaxed="0.0 0.0 0.0 1.0"', f'relaxed="{wrong}"', 1))
+
+
+def test_the_stiffness_of_a_backbone_is_what_a_fit_starts_from() -> None:
+    """A robot whose fields hold what its backbone has is the same robot; measured values stand as they are."""
+    arm = sr.TendonArm(backbone_radius=(4e-4, 5e-4, 6e-4), elastic_sections=1)
+    kinds = ("bending", "torsional", "axial")
+    told = {f"{kind}_stiffness": getattr(arm, f"{kind}_in_force") for kind in kinds}
+    assert told["axial_stiffness"] == pytest.approx([50e9 * math.pi * radius**2 for radius in arm.backbone_radius])
+    measured = dataclasses.replace(arm, **told)
+    assert {f"{kind}_stiffness": getattr(measured, f"{kind}_in_force") for kind in kinds} == told
+    springs = sr.load_model(arm).stiffness
+    assert np.allclose(sr.load_model(measured).stiffness, springs, rtol=1e-15)

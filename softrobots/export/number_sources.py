@@ -11,8 +11,6 @@ import math
 from collections.abc import Mapping
 from typing import Any
 
-import numpy as np
-
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
 from softrobots.robots import HelixTube, InflatableArm, TendonArm, XacroRobot
 from softrobots.robots.continuum_arm import ATTRIBUTES, ContinuumArm
@@ -84,21 +82,15 @@ def _link_stiffness(robot: InflatableArm) -> list[_Row]:
 
 
 def _backbone(robot: TendonArm) -> list[_Row]:
-    radius, modulus, ratio = (np.array(getattr(robot, name)) for name in ("backbone_radius", "young_modulus", "poisson_ratio"))
-    rods: dict[str, tuple[str, Any, str, str]] = {
-        "EI": ("bending", modulus * math.pi * radius**4 / 4.0, "N m2", "young_modulus[0] * pi * backbone_radius[0]**4 / 4"),
-        "GJ": (
-            "torsional",
-            modulus / (2.0 * (1.0 + ratio)) * math.pi * radius**4 / 2.0,
-            "N m2",
-            "young_modulus[0] / (2 * (1 + poisson_ratio[0])) * pi * backbone_radius[0]**4 / 2",
-        ),
-        "EA": ("axial", modulus * math.pi * radius**2, "N", "young_modulus[0] * pi * backbone_radius[0]**2"),
+    rods = {
+        "EI": ("bending", "N m2", "young_modulus[0] * pi * backbone_radius[0]**4 / 4"),
+        "GJ": ("torsional", "N m2", "young_modulus[0] / (2 * (1 + poisson_ratio[0])) * pi * backbone_radius[0]**4 / 2"),
+        "EA": ("axial", "N", "young_modulus[0] * pi * backbone_radius[0]**2"),
     }
     rows: list[_Row] = []
-    for name, (kind, of_rod, unit, rule) in rods.items():
-        measured = getattr(robot, f"{kind}_stiffness")
-        values, source = (of_rod.tolist(), rule) if measured is None else (list(measured), f"{kind}_stiffness[0]")
+    for name, (kind, unit, rule) in rods.items():
+        source = rule if getattr(robot, f"{kind}_stiffness") is None else f"{kind}_stiffness[0]"
+        values = list(getattr(robot, f"{kind}_in_force"))
         rows.append((name, values, unit, f"{kind.capitalize()} stiffness of a segment", source))
     return rows
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from softrobots.robots.continuum_arm import ROUTING, ContinuumArm
@@ -91,18 +91,47 @@ class TendonArm(ContinuumArm):
         0.3, "-", "Poisson ratio of the backbone", "OpenCR, published configuration", above=-1.0, at_most=0.5
     )
     bending_stiffness: PerPart | None = per_part(
-        None, "N m^2", "Measured bending stiffness EI; without it, of the backbone, E pi r^4 / 4", above=0.0
+        None,
+        "N m^2",
+        "Measured bending stiffness EI; without it, of the backbone, E pi r^4 / 4",
+        above=0.0,
+        in_force="bending_in_force",
     )
     torsional_stiffness: PerPart | None = per_part(
-        None, "N m^2", "Measured torsional stiffness GJ; without it, of the backbone, E / (2 (1 + nu)) pi r^4 / 2", above=0.0
+        None,
+        "N m^2",
+        "Measured torsional stiffness GJ; without it, of the backbone, E / (2 (1 + nu)) pi r^4 / 2",
+        above=0.0,
+        in_force="torsional_in_force",
     )
     axial_stiffness: PerPart | None = per_part(
-        None, "N", "Measured axial stiffness EA; without it, of the backbone, E pi r^2", above=0.0
+        None, "N", "Measured axial stiffness EA; without it, of the backbone, E pi r^2", above=0.0, in_force="axial_in_force"
     )
 
     XACRO = "tendon_arm.urdf.xacro"
     ACTUATOR = "tendon"
     KINDS = ("elastic", "tension", "length")
+
+    @property
+    def bending_in_force(self) -> tuple[float, ...]:
+        """Bending stiffness EI of each segment, as measured or of the backbone [N m^2]."""
+        return self._in_force("bending_stiffness", lambda e, nu, r: e * math.pi * r**4 / 4.0)
+
+    @property
+    def torsional_in_force(self) -> tuple[float, ...]:
+        """Torsional stiffness GJ of each segment, likewise [N m^2]."""
+        return self._in_force("torsional_stiffness", lambda e, nu, r: e / (2.0 * (1.0 + nu)) * math.pi * r**4 / 2.0)
+
+    @property
+    def axial_in_force(self) -> tuple[float, ...]:
+        """Axial stiffness EA of each segment, likewise [N]."""
+        return self._in_force("axial_stiffness", lambda e, nu, r: e * math.pi * r**2)
+
+    def _in_force(self, name: str, of_rod: Callable[[float, float, float], float]) -> tuple[float, ...]:
+        if getattr(self, name) is not None:
+            return self._each(name)
+        rods = zip(*(self._each(fact) for fact in ("young_modulus", "poisson_ratio", "backbone_radius")), strict=True)
+        return tuple(of_rod(*rod) for rod in rods)
 
     @property
     def n_tendons(self) -> int:
