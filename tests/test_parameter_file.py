@@ -86,6 +86,7 @@ def test_a_robot_comes_back_from_its_file(name: str, ending: str, told, tmp_path
     made = sr.ROBOTS[name]
     assert robot == dataclasses.replace(made(), rgba=(0.1, 0.2, 0.3, 1.0))
     assert read_robot(file, name) == robot
+    assert told("urdf", str(file))[1] == robot.urdf()
     if ending == "yaml":
         assert "base_mass: " in file.read_text(encoding="utf-8")
         assert "  # kg\n" in file.read_text(encoding="utf-8")
@@ -97,6 +98,17 @@ def test_one_value_stands_for_parts_that_have_the_same(told, tmp_path: Path) -> 
     assert told("urdf", "inflatable_arm", "--set", "radius=[0.06,0.05]", "--save-parameters", str(file))[0] == 0
     values = read_parameters(file).values
     assert (values["link_lengths"], values["radius"], values["pressure"]) == ((0.6, 0.6), (0.06, 0.05), 50e3)
+
+
+def test_a_file_stands_for_its_robot_in_commands(told, tmp_path: Path) -> None:
+    file = tmp_path / "arm.yaml"
+    write_parameters(file, "inflatable_arm", {"stiffness": 150.0})
+    assert told("urdf", str(file), "--set", "radius=0.05")[1] == sr.InflatableArm(stiffness=150.0, radius=0.05).urdf()
+    assert "no robot or file is called" in told("urdf", str(tmp_path / "other.yaml"))[2]
+    file.write_text("stiffness: 150.0\n", encoding="utf-8")
+    status, out, err = told("urdf", str(file))
+    assert (status, out) == (2, "")
+    assert "a file of parameters with a line robot: NAME, of inflatable_arm" in err
 
 
 def test_words_mean_what_they_mean_in_yaml_1_2(tmp_path: Path) -> None:

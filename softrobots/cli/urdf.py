@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import argparse
-import contextlib
-import dataclasses
 import sys
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from softrobots.cli.options.robot_argument import add_robot, robot_file, source_of
-from softrobots.cli.options.robot_parameters import first_sentence, robot_parameters, xacro_parameters
+from softrobots.cli.options.robot_parameters import first_sentence, robot_parameters, write_robot, xacro_parameters
 from softrobots.cli.reports.answers import add_json, aligned, print_answer
 from softrobots.cli.tools.checks import check_description
 from softrobots.core.errors import ParameterError
@@ -19,7 +17,6 @@ from softrobots.core.files import new_file, write_text
 from softrobots.description.sources import read_source
 from softrobots.description.urdf_rules import Finding
 from softrobots.robots import ROBOTS, Robot
-from softrobots.robots.parameter_file import write_parameters
 
 SHOWN = 8
 """Largest number of problems of one kind that are listed."""
@@ -98,22 +95,9 @@ def _write(arguments: argparse.Namespace, source: Robot | Path | str) -> dict[st
     if arguments.output is not None:
         files.append(write_text(arguments.output, read_source(source)[0], overwrite=arguments.overwrite))
     if arguments.save_parameters is not None:
-        known = robot_parameters(arguments.robot)
-        values = {parameter.name: _shortest(source, parameter.name) for parameter in known}
-        units = {parameter.name: parameter.unit for parameter in known}
         file, overwrite = arguments.save_parameters, arguments.overwrite
-        files.append(write_parameters(file, arguments.robot, values, units=units, overwrite=overwrite))
+        files.append(write_robot(file, arguments.robot, source, overwrite=overwrite))
     return {"files": files} if files else {}
-
-
-def _shortest(robot: Any, name: str) -> Any:
-    """A parameter of a robot, as one value if all parts have the same and the robot accepts one."""
-    value = getattr(robot, name)
-    if isinstance(value, tuple) and value and all(item == value[0] for item in value):
-        with contextlib.suppress(ParameterError):
-            if dataclasses.replace(robot, **{name: value[0]}) == robot:
-                return value[0]
-    return value
 
 
 def _report(findings: Sequence[Finding]) -> list[str]:

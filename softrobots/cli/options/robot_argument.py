@@ -24,10 +24,13 @@ from softrobots.robots.fields import argument_text
 from softrobots.robots.parameter_file import read_parameters
 
 
-def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
-    """Add `ROBOT`, which may be `optional`, `--set` and `--parameters` to a parser; see `source_of`."""
-    help_text = f"{', '.join(ROBOTS)}; or a URDF, xacro, MJCF or SDF file"
-    parser.add_argument("robot", nargs="?" if optional else None, metavar="ROBOT", help=help_text)
+def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False, option: bool = False) -> None:
+    """Add `ROBOT`, which may be `optional`, or `--robot`, `--set` and `--parameters` to a parser; see `source_of`."""
+    help_text = f"{', '.join(ROBOTS)}; a file of parameters that names one of them; or a URDF, xacro, MJCF or SDF file"
+    if option:
+        parser.add_argument("--robot", required=True, metavar="ROBOT", help=f"{help_text} (required)")
+    else:
+        parser.add_argument("robot", nargs="?" if optional else None, metavar="ROBOT", help=help_text)
     parser.add_argument(
         "--set",
         dest="parameters",
@@ -43,9 +46,9 @@ def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False) -> Non
     parser.add_argument("--parameters", dest="parameter_file", type=Path, metavar="FILE", help=help_text)
 
 
-def add_model(parser: argparse.ArgumentParser, *, optional: bool = False) -> None:
+def add_model(parser: argparse.ArgumentParser, *, optional: bool = False, option: bool = False) -> None:
     """Add the options of `add_robot`, and `--spring`, `--tip` and `--muscles`, to a parser; see `model_of`."""
-    add_robot(parser, optional=optional)
+    add_robot(parser, optional=optional, option=option)
     help_text = "spring of a joint: stiffness K [N m/rad or N/m], relaxed at REST [rad or m] (that of the file, or 0); once "
     help_text += "for each joint; JOINT=none takes a spring away; other joints keep the springs of the file"
     parser.add_argument("--spring", action="append", type=spring, default=[], metavar="JOINT=K[,REST]", help=help_text)
@@ -95,6 +98,11 @@ def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
     """
     robot, parameters = arguments.robot, arguments.parameters
     values: dict[str, Any] = {}
+    if arguments.parameter_file is None and robot not in ROBOTS and Path(robot).suffix.lower() in (".yaml", ".yml", ".json"):
+        owner, values = read_parameters(robot_file(robot))
+        if owner not in ROBOTS:
+            raise ParameterError("ROBOT", robot, f"a file of parameters with a line robot: NAME, of {', '.join(ROBOTS)}")
+        robot = owner
     if arguments.parameter_file is not None:
         owner, values = read_parameters(arguments.parameter_file)
         if owner not in (None, robot, Path(robot).name):
@@ -142,8 +150,9 @@ def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
     """
     source = source_of(arguments)
     if isinstance(source, XacroRobot):
-        option = "--set" if arguments.parameters else "--parameters"
-        refuse_too_large(source, option, " ".join(arguments.parameters) or str(arguments.parameter_file))
+        given = {"--set": " ".join(arguments.parameters), "--parameters": arguments.parameter_file, "ROBOT": arguments.robot}
+        option = next(name for name, value in given.items() if value)
+        refuse_too_large(source, option, str(given[option]))
     return model_of(arguments, source)
 
 

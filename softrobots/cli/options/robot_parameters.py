@@ -15,7 +15,7 @@ from softrobots.description.argument_notes import argument_notes
 from softrobots.description.expansion import declared_arguments
 from softrobots.robots import ROBOTS, XacroRobot, robot_class
 from softrobots.robots.fields import facts_of
-from softrobots.robots.parameter_file import parse_yaml
+from softrobots.robots.parameter_file import parse_yaml, write_parameters
 
 _WORDS = {"true": True, "false": False, "none": None, "": None}  # as xacro arguments spell them
 
@@ -120,6 +120,23 @@ def make_robot(name: str, words: Sequence[str], values: Mapping[str, Any] | None
     return ROBOTS[name](**{**(values or {}), **{field: _value(text) for field, text in texts.items()}})
 
 
+def name_of(robot: XacroRobot) -> str | None:
+    """Return the name in `ROBOTS` of a robot, whose preset fields it has; None if it is of no class there."""
+    for name in reversed(list(ROBOTS)):
+        kind, preset = robot_class(name)
+        if type(robot) is kind and all(getattr(robot, field) == value for field, value in preset.items()):
+            return name
+    return None
+
+
+def write_robot(path: Path, name: str, robot: Any, *, overwrite: bool) -> Path:
+    """Write all parameters of a robot of `ROBOTS` to a file with their units; errors are those of `write_parameters`."""
+    known = robot_parameters(name)
+    values = {parameter.name: _shortest(robot, parameter.name) for parameter in known}
+    units = {parameter.name: parameter.unit for parameter in known}
+    return write_parameters(path, name, values, units=units, overwrite=overwrite)
+
+
 def first_sentence(name: str) -> str:
     """Return the first line of the docstring of a robot of `ROBOTS`, with the fields that its entry presets."""
     kind, preset = robot_class(name)
@@ -136,6 +153,16 @@ def _value(text: str) -> Any:
     with contextlib.suppress(FileFormatError):
         return parse_yaml(text) if text.strip().startswith("[") else text
     return text
+
+
+def _shortest(robot: Any, name: str) -> Any:
+    """A parameter of a robot, as one value if all parts have the same and the robot accepts one."""
+    value = getattr(robot, name)
+    if isinstance(value, tuple) and value and all(item == value[0] for item in value):
+        with contextlib.suppress(ParameterError):
+            if dataclasses.replace(robot, **{name: value[0]}) == robot:
+                return value[0]
+    return value
 
 
 def _typed(value: Any) -> str:
