@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import softrobots.dynamics.saved_modes
 import softrobots.dynamics.saved_motion
+import softrobots.identification.saved_identification
 import softrobots.identification.saved_measurements  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.core.errors import (
@@ -36,6 +37,8 @@ from softrobots.dynamics.linear_model import LinearModel, linearize
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
+from softrobots.identification.identification import Identification
+from softrobots.identification.identify import identify
 from softrobots.identification.measurements import Measurements
 from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
@@ -75,6 +78,7 @@ __all__ = [
     "EquilibriumNotFound",
     "FileFormatError",
     "HelixTube",
+    "Identification",
     "IkSolution",
     "ImposedDisplacement",
     "InflatableArm",
@@ -123,6 +127,7 @@ __all__ = [
     "follow_trajectory",
     "grown_coordinates",
     "helix",
+    "identify",
     "inflated_beam",
     "input_shaper",
     "linearize",

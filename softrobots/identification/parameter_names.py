@@ -153,18 +153,19 @@ class Registry:
         values = self._values(field)
         if not isinstance(values, tuple):
             return ()
-        if attribute and word == self._actuator != self._part:
-            values = self._one_each(values)
-        groups = _numbered(inside, len(values))
-        texts = [f"{word}[{','.join(str(i + 1) for i in group)}]" + (f".{attribute}" if attribute else "") for group in groups]
-        return tuple(self._field(field, text, values, group) for text, group in zip(texts, groups, strict=True))
-
-    def _one_each(self, values: tuple[float, ...]) -> tuple[float, ...]:
-        """Values of actuators, one each, of values one a segment."""
-        robot: Any = self._robot
-        if len(values) != len(robot.segment_lengths) or len(values) == robot.n_actuators:
-            return values
-        return tuple(values[tag.segments[-1] - 1] for tag in self._model.muscles)
+        robot, of_segments = self._robot, False
+        if attribute and self._facts[field].form == "per_actuator":
+            if word == self._actuator and len(values) < robot.n_actuators:
+                values = robot.by_actuator(field)
+            of_segments = word == self._part and len(values) > robot.n_segments
+        parts = groups = _numbered(inside, robot.n_segments if of_segments else len(values))
+        if of_segments:
+            groups = [tuple(i for i, one in enumerate(robot.actuator_segments) if one in some) for some in parts]
+        texts = [",".join(str(i + 1) for i in part) for part in parts]
+        end = f".{attribute}" if attribute else ""
+        return tuple(
+            self._field(field, f"{word}[{text}]{end}", values, group) for text, group in zip(texts, groups, strict=True)
+        )
 
     def _spring(self, joints: Sequence[str], what: str) -> Parameter:
         table, springs = self._model.spring_table, self._model.structure.strain_springs

@@ -34,6 +34,7 @@ from softrobots.identification.parameter_names import Kind, Parameter, Registry
 from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import AssumedStiffnessWarning
+from softrobots.robots.variants import Variants
 
 OF_MODEL = ("field", "spring")
 """Kinds of parameters that change the model."""
@@ -124,21 +125,12 @@ class ParameterSet:
         Raises:
             ParameterError: If the shape differs, or the robot refuses a value.
         """
-        numbers, robot = finite_array("values", values, (len(self.parameters),)).tolist(), self.present.robot
-        changed: dict[str, Any] = {}
-        for number, one in self.places("field"):
-            (field,), entries = one.place.names, one.place.parts
-            if not entries:
-                changed[field] = numbers[number]
-                continue
-            row = changed.setdefault(field, list(one.place.row))
-            for entry in entries:
-                row[entry] = numbers[number]
-        if not changed:
-            return robot
+        numbers = finite_array("values", values, (len(self.parameters),))
+        if not self._entries:
+            return self.present.robot
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AssumedStiffnessWarning)  # told when the robot was made
-            return replace(robot, **{name: tuple(row) if isinstance(row, list) else row for name, row in changed.items()})
+            return self._variants.robot(numbers[list(self._entries.values())])
 
     def model(self, values: Any) -> SoftModel:
         """Return the robot with values, shape (P,), loaded as the present one was.
@@ -177,6 +169,20 @@ class ParameterSet:
         for number, one in self.places("offset"):
             offsets[list(one.place.parts)] += values[number]
         return offsets
+
+    @cached_property
+    def _entries(self) -> dict[tuple[str, int | None], int]:
+        """Number of the parameter by each number of the dataclass that it sets."""
+        fields = self.places("field")
+        return {(one.place.names[0], part): number for number, one in fields for part in one.place.parts or (None,)}
+
+    @cached_property
+    def _variants(self) -> Variants:
+        """The robot with its present values, where it has none with those in force."""
+        rows = {one.place.names[0]: one.place.row for _, one in self.places("field") if one.place.row}
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", AssumedStiffnessWarning)
+            return Variants(replace(self.present.robot, **rows), list(self._entries))
 
     @cached_property
     def _told(self) -> dict[str, Any]:

@@ -266,6 +266,9 @@ def results() -> dict[str, Any]:
     path = sr.straight_line(*poses, 1.0, 2)
     grid = TargetGrid((0.6, 0.8), (0.0,), (0.3,))
     angle = np.linspace(0.01, 0.2, 20)
+    robot = sr.InflatableArm(stiffness=150.0)
+    tips = [[1.17, 0.1, -0.02], [1.15, 0.2, 0.01], [1.1, 0.3, np.nan]]
+    rows = sr.Measurements(np.eye(3) * 0.2, force=np.eye(3), tip_position=tips, labels=["a", "b", "c"])
     return {
         "characterisation": inflated_beam.fit_characterisation(
             angle, np.minimum(170.0 * angle, 20.0), pressure=5e4, radius=0.055
@@ -285,6 +288,7 @@ def results() -> dict[str, Any]:
         "measurements": sr.Measurements(
             np.array([[0.1, 0.2], [0.3, 0.4]]), tip_position=[[1.0, 2.0, np.nan], [3.0, 4.0, 5.0]], std=0.1, labels=["a", "b"]
         ),
+        "identification": sr.identify(robot, rows, ("stiffness", "base.position.z"), validation="b"),
     }
 
 
@@ -314,6 +318,9 @@ def read_result(file: Path) -> None:
         return
     if isinstance(result, WorkspaceMap):
         finite(result.payload, result.q_motors, result.q_springs)
+        return
+    if isinstance(result, sr.Identification):
+        finite(result.solution, result.covariance, result.history.cost, *result.predicted.values())
         return
     if isinstance(result, sr.Measurements):
         finite(result.q_motors, *result.loads.values(), *result.std.values())

@@ -1,0 +1,241 @@
+"""The result of a fit of parameters to measurements: values with intervals, and how well they explain what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.errors import ParameterError
+from softrobots.identification.fit import Fit
+from softrobots.identification.gauges import find_gauges
+from softrobots.identification.measurements import Measurements
+from softrobots.identification.parameter_names import Parameter
+from softrobots.identification.prediction import Predictor
+from softrobots.identification.uncertainty import Uncertainty, outliers, uncertainty_from_blocks, uncertainty_from_rows
+from softrobots.model.soft_model import SoftModel
+
+UNITS = {"positions": "m", "motor_torques": "N m or N", "tensions": "N", "frequencies": "Hz"}
+"""Units of measured quantities; of poses m and rad."""
+
+
+class Comparison(NamedTuple):
+    """Measured rows beside what is predicted for them."""
+
+    measurements: Measurements
+    """The rows."""
+    predicted: Mapping[str, FloatArray]
+    """Predictions, by the names and in the shapes of `measurements.measured`."""
+    residuals: Mapping[str, FloatArray]
+    """Measured minus predicted by quantity, shape (n, k), of poses position and rotation vector (n, 6); NaN where missing or
+    not counted."""
+
+    @property
+    def errors(self) -> dict[str, tuple[float, str]]:
+        """Root mean square of the residuals by quantity, of positions of their length, and unit."""
+        found = {}
+        for key, values in self.residuals.items():
+            kind, _, name = key.partition(".")
+            parts = {key: (values, UNITS.get(kind, ""))}
+            if kind == "poses":
+                parts = {f"position of {name}": (values[:, :3], "m"), f"rotation of {name}": (values[:, 3:], "rad")}
+            for label, (numbers, unit) in parts.items():
+                squares = np.nansum(numbers**2, axis=1) if kind in ("positions", "poses") else numbers.ravel() ** 2
+                there = np.isfinite(numbers).any(axis=1) if kind in ("positions", "poses") else np.isfinite(numbers.ravel())
+                found[label] = (float(np.sqrt(np.mean(squares[there]))) if there.any() else 0.0, unit)
+        return found
+
+
+class History(NamedTuple):
+    """The steps of a fit."""
+
+    cost: FloatArray
+    """Half the sum of the losses, shape (n,)."""
+    values: FloatArray
+    """Values of the parameters, shape (n, P)."""
+
+    @property
+    def steps(self) -> FloatArray:
+        """Largest change of a parameter in each step, relative to its value or, if that is smaller, 1 in its unit, (n - 1,)."""
+        change = np.abs(np.diff(self.values, axis=0)) / np.maximum(np.abs(self.values[1:]), 1.0)
+        return np.asarray(change.max(axis=1, initial=0.0))
+
+
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
+class Identification:
+    """Fitted parameters of a robot; returned by `softrobots.identify`, saved by `softrobots.save_result`."""
+
+    model: SoftModel
+    """The robot with the fitted values."""
+    parameters: tuple[Parameter, ...]
+    """The parameters, each with the value from which the fit started."""
+    solution: FloatArray
+    """Fitted values, shape (P,)."""
+    by_rows: Uncertainty
+    """Uncertainty of the fitted coordinates (logarithms of positive parameters) if the errors of rows are independent."""
+    by_blocks: Uncertainty | None
+    """Uncertainty if only errors of different blocks are independent: of labels, or measured rows; None with fewer than two."""
+    fitted: Comparison
+    """The measurements that were fitted, and what is predicted."""
+    validation: Comparison | None
+    """What was kept aside, and what is predicted; None if nothing was."""
+    outliers: tuple[int, ...]
+    """Rows of `fitted.measurements` with a number too far off to be noise, the worst first."""
+    unidentifiable: tuple[str, ...]
+    """What the measurements cannot tell apart, in words."""
+    held: int
+    """Number of combinations of parameters without any effect, which kept the values they started with."""
+    history: History
+    """Cost and values at every step."""
+    priors: Mapping[str, tuple[float, float]]
+    """Mean and standard deviation of what was known before, by parameter."""
+    loss: str
+    """The loss."""
+    message: str
+    """How the fit ended: "converged", or why not."""
+
+    @property
+    def robot(self) -> Any:
+        """The dataclass with the fitted values, which every function and command takes; None of a file, and if not known."""
+        return self.model.robot
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the parameters."""
+        return tuple(one.name for one in self.parameters)
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Fitted values by name."""
+        return dict(zip(self.names, self.solution.tolist(), strict=True))
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """95 % intervals by name, from rows."""
+        return self._intervals(self.by_rows)
+
+    @property
+    def block_intervals(self) -> dict[str, tuple[float, float]]:
+        """95 % intervals by name, from blocks; empty without."""
+        return {} if self.by_blocks is None else self._intervals(self.by_blocks)
+
+    @property
+    def covariance(self) -> FloatArray:
+        """Covariance of the values, from rows, shape (P, P), in their units; of the part that is determined."""
+        return self._covariance(self.by_rows)
+
+    @property
+    def block_covariance(self) -> FloatArray | None:
+        """The same from blocks; None with fewer than two."""
+        return None if self.by_blocks is None else self._covariance(self.by_blocks)
+
+    @property
+    def predicted(self) -> Mapping[str, FloatArray]:
+        """Predictions of what was fitted, by quantity."""
+        return self.fitted.predicted
+
+    @property
+    def residuals(self) -> Mapping[str, FloatArray]:
+        """Measured minus predicted of what was fitted, by quantity; see `Comparison`."""
+        return self.fitted.residuals
+
+    def __repr__(self) -> str:
+        """Values in one line."""
+        return f"Identification({', '.join(f'{name}={value:.6g}' for name, value in self.values.items())}: {self.message})"
+
+    def summary(self) -> str:
+        """Return values, intervals, errors and what cannot be told apart, as a table for a person."""
+        header: tuple[str, ...] = ("parameter", "unit", "start", "value", "95 % by rows", "95 % by blocks", "prior")
+        rows, blocks = self.intervals, self.block_intervals
+        table = [header] + [
+            (
+                one.name,
+                one.unit,
+                f"{one.value:.6g}",
+                f"{value:.6g}",
+                _interval(rows[one.name]),
+                _interval(blocks.get(one.name)),
+                "{:.6g} +- {:.3g}".format(*self.priors[one.name]) if one.name in self.priors else "",
+            )
+            for one, value in zip(self.parameters, self.solution.tolist(), strict=True)
+        ]
+        lines = [f"{self.message}, {len(self.history.cost)} steps, loss {self.loss}", "", *_aligned(table), ""]
+        for title, comparison in (("fitted", self.fitted), ("kept aside", self.validation)):
+            if comparison is not None:
+                lines.append(f"root mean square errors, {len(comparison.measurements)} rows {title}:")
+                lines += _aligned([(f"  {key}", f"{error:.4g}", unit) for key, (error, unit) in comparison.errors.items()])
+        if self.outliers:
+            where = self.fitted.measurements.where
+            lines.append(f"outliers ({len(self.outliers)} rows): {', '.join(map(where, self.outliers[:10]))}")
+        if self.held:
+            lines.append(f"combinations without effect, which kept their start: {self.held}")
+        lines += [f"not told apart: {text}" for text in self.unidentifiable]
+        return "\n".join(lines)
+
+    def _intervals(self, uncertainty: Uncertainty) -> dict[str, tuple[float, float]]:
+        ends = uncertainty.intervals(self.solution, [one.logarithmic for one in self.parameters])
+        return {name: (low, high) for name, (low, high) in zip(self.names, ends.tolist(), strict=True)}
+
+    def _covariance(self, uncertainty: Uncertainty) -> FloatArray:
+        rates = np.where([one.logarithmic for one in self.parameters], self.solution, 1.0)
+        return np.asarray(uncertainty.covariance * np.outer(rates, rates))
+
+
+def identification_of(fit: Fit, aside: Measurements | None) -> Identification:
+    """Return the result of a fit, with predictions of measurements that were kept aside."""
+    predictor, weights = fit.predictor, fit.weights
+    prediction, residuals, slopes = fit.at_end()
+    parameters, information = predictor.parameters, fit.information
+    less = np.sqrt(fit.loss_slopes(residuals))  # a robust loss weighs rows
+    rows, labels = weights.rows(), predictor.measurements.labels
+    blocks = rows if labels is None else np.unique(np.array(labels), return_inverse=True)[1][rows]
+    weighted, downweighted = slopes * less[:, None], residuals * less
+    named = list(zip(parameters.parameters, fit.values.tolist(), strict=True))
+    try:
+        by_rows = uncertainty_from_rows(weighted, downweighted, prior=information, std_known=weights.known)
+    except ParameterError:  # as many parameters as numbers: nothing tells the size of the errors
+        by_rows = Uncertainty(np.zeros((len(information),) * 2), np.inf, np.zeros(len(information), dtype=bool))
+    several = len(set(blocks.tolist())) > 1
+    by_blocks = uncertainty_from_blocks(weighted, downweighted, blocks, prior=information) if several else None
+    size = 1.0 if weights.known else max(float(np.sqrt(np.sum(downweighted**2) / max(len(rows) - len(named), 1))), 1e-12)
+    found = find_gauges(weighted / size, [replace(one, value=value) for one, value in named], prior=information / size**2)
+    worst = outliers(slopes, residuals, prior=information)
+    means = {predictor.parameters.names[i]: pair for i, *pair in zip(*map(np.ndarray.tolist, fit.prior), strict=True)}
+    validation = None
+    if aside is not None:
+        others = Predictor(parameters, aside).at(fit.values)
+        validation = _comparison(aside, others, {key: np.ones(one.shape, bool) for key, one in others.differences().items()})
+    return Identification(
+        model=prediction.model,
+        parameters=parameters.parameters,
+        solution=read_only(fit.values),
+        by_rows=by_rows,
+        by_blocks=by_blocks,
+        fitted=_comparison(predictor.measurements, prediction, weights.counted),
+        validation=validation,
+        outliers=tuple(dict.fromkeys(rows[worst].tolist())),
+        unidentifiable=tuple(map(str, found)),
+        held=fit.held,
+        history=History(*(read_only(np.array(column)) for column in zip(*fit.course, strict=True))),
+        priors={name: (float(mean), float(std)) for name, (mean, std) in means.items()},
+        loss=fit.loss,
+        message=fit.message,
+    )
+
+
+def _comparison(measurements: Measurements, prediction: Any, counted: Mapping[str, Any]) -> Comparison:
+    """Measurements beside a prediction; residuals of what does not count are NaN."""
+    residuals = {key: np.where(counted[key], values, np.nan) for key, values in prediction.differences().items()}
+    return Comparison(measurements, {key: seen.values for key, seen in prediction.seen.items()}, residuals)
+
+
+def _interval(ends: tuple[float, float] | None) -> str:
+    return "" if ends is None else f"{ends[0]:.5g} .. {ends[1]:.5g}" if np.isfinite(ends).all() else "not determined"
+
+
+def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

@@ -1,0 +1,195 @@
+r"""Parameters of a robot from measurements: weighted nonlinear least squares with exact derivatives.
+
+The fit minimises :math:`\sum_i \rho(r_i^2) + \sum_j ((m_j - p_j) / s_j)^2` with :math:`r = (measured - predicted(p)) / std`, a
+loss :math:`\rho` and priors of mean `m` and standard deviation `s`, by SciPy's trust region method (Branch, Coleman and Li
+1999) within the bounds of the physics. Positive parameters are fitted by their logarithm. A step to values that the robot
+refuses, or where a row has no equilibrium, is refused. A combination of parameters that changes no prediction keeps the
+value that it starts with; one that the measurements tell badly is fitted. Both are told in words (see `gauges`).
+"""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator, Mapping, Sequence
+from fnmatch import fnmatchcase
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_array, positive_integer
+from softrobots.core.errors import NameNotFound, ParameterError, SoftRobotsError
+from softrobots.core.progress import with_progress
+from softrobots.identification.fit import INTERRUPTED, Fit, Prior, Weights
+from softrobots.identification.identification import Identification, identification_of
+from softrobots.identification.measurements import Measurements
+from softrobots.identification.parameters import ParameterSet
+from softrobots.identification.prediction import Predictor
+
+LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
+"""Losses of `identify`."""
+
+_PERFECT = 1e-18  # share of the squares at the start at which a fit leaves nothing but rounding
+_FEW = 50  # rows, spread evenly, with which a search begins where there are more than twice as many
+_SPREAD = 0.3  # of random starts, relative; for angles and rotations in rad, for lengths relative to the reach
+
+
+def identify(
+    robot: Any,
+    measurements: Measurements,
+    parameters: str | Sequence[str],
+    *,
+    loss: str = "linear",
+    priors: Mapping[str, tuple[Any, Any]] | None = None,
+    validation: Any = None,
+    starts: int = 1,
+    seed: int = 0,
+    max_iterations: int = 100,
+    progress: bool | str = False,
+) -> Identification:
+    """Fit parameters of a robot to measurements.
+
+    Where the standard deviations of a quantity are not known, the robust spread of its residuals after a first fit stands for
+    them, and the intervals are scaled by the reduced chi-square.
+
+    Args:
+        robot: A dataclass of parameters with the values to start from, or a `SoftModel`.
+        measurements: What was measured; rows that its mask leaves out do not count.
+        parameters: Names of what is unknown, see `softrobots.identification.parameters`.
+        loss: "linear", or one in which outliers count less, from residuals of one standard deviation on: "soft_l1", "huber",
+            "cauchy", "arctan".
+        priors: `{name: (mean, standard deviation)}` in the unit of the parameter; for a name of several components numbers for
+            all or arrays.
+        validation: What is kept aside and told apart: a mask of rows, labels (or patterns of them), or other `Measurements`.
+        starts: Number of starts: the present values, then random ones around them within the bounds; the best fit counts.
+        seed: Seed of those.
+        max_iterations: Limit of steps of each search.
+        progress: Show a progress bar, or one with this label. Ctrl-C ends the fit with the best values up to then.
+
+    Returns:
+        The fit, whether or not it converged; see its `message`.
+
+    Raises:
+        ParameterError: If an argument is out of range, the measurements are not those of this robot, a parameter is one of
+            derivatives only, or rows have no equilibrium at the values to start from; names the rows.
+        NameNotFound: If there is no such parameter, frame or label.
+        DescriptionError: If the robot cannot be loaded.
+    """
+    instance_of("measurements", measurements, Measurements, "Measurements")
+    choice("loss", loss, LOSSES)
+    most, count = positive_integer("max_iterations", max_iterations), positive_integer("starts", starts)
+    chosen = ParameterSet.of(robot, parameters, measurements.markers)
+    loads = [one.name for one in chosen.parameters if one.place.kind in ("motor", "force", "wrench", "gravity")]
+    if loads:
+        raise ParameterError("parameters", loads[0], "no load or actuator coordinate: measurements give those")
+    listed = [parameters] if isinstance(parameters, str) else list(parameters)
+    prior = _prior(chosen, listed, measurements.markers, priors or {})
+    counted, aside = _split(measurements, validation)
+    if chosen.present.structure.friction is None:  # rows in any order
+        rows, counted = measurements[counted], np.ones(int(counted.sum()), dtype=bool)
+    else:
+        rows = measurements
+    others = aside if aside is None or isinstance(aside, Measurements) else measurements[aside]
+    if others is not None:
+        others.check(chosen.present)
+    steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
+    values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
+    with one_blas_thread(1000):
+        predictor = Predictor(chosen, rows)
+        weights = Weights.of(rows.std, predictor.at(values[0]).differences(), counted)
+        robust = loss if weights.known else "linear"
+        if every > 1 and chosen.present.structure.friction is None:
+            few = Predictor(chosen, rows[::every])
+            quick = _best(few, weights.every(every), prior, robust, steps, values, most)
+            values, message = [quick.values], quick.message
+        best = _best(predictor, weights, prior, robust, steps, values, 0 if message == INTERRUPTED else most)
+        again = not weights.known and (loss != "linear" or len(weights.std) > 1)
+        if again and INTERRUPTED not in (message, best.message) and best.cost > _PERFECT * len(weights.rows()):
+            weights = weights.estimated(best.at_end()[0].differences())
+            best = _best(predictor, weights, prior, loss, steps, [best.values], most)
+        best.message = message if message == INTERRUPTED else best.message
+        return identification_of(best, others)
+
+
+def _best(
+    predictor: Predictor,
+    weights: Weights,
+    prior: Prior,
+    loss: str,
+    steps: Iterator[Any],
+    starts: Sequence[FloatArray],
+    most: int,
+) -> Fit:
+    """The best fit of several starts; those without equilibria but the first are passed over."""
+    best: Fit | None = None
+    for start in starts:
+        fit = Fit(predictor, weights, prior, loss, steps)
+        try:
+            fit.run(start, most)
+        except SoftRobotsError:
+            if best is None:
+                raise
+            continue
+        if best is None or fit.cost < best.cost:
+            best = fit
+        if fit.message == INTERRUPTED:
+            best.message = INTERRUPTED
+            break
+    return best  # type: ignore[return-value]
+
+
+def _starts(chosen: ParameterSet, seed: int, count: int) -> list[FloatArray]:
+    """The present values, and random ones around them within the bounds."""
+    random = np.random.default_rng(seed)
+    values, lower, upper = chosen.values, chosen.lower, chosen.upper
+    scale = np.array([chosen.present.reach if unit == "m" else 1.0 for unit in chosen.units])
+    found = [np.array(values)]
+    for _ in range(count - 1):
+        change = _SPREAD * random.standard_normal(len(values))
+        other = np.where(chosen.logarithmic, values * np.exp(change), values + change * np.maximum(np.abs(values), scale))
+        outside = (other <= lower) | (other >= upper)
+        found.append(np.where(outside, values, other))
+    return found
+
+
+def _prior(chosen: ParameterSet, listed: Sequence[str], markers: Mapping[str, str], priors: Any) -> Prior:
+    """The priors by scalar parameter, from names of scalars, or of several as they are in the list of parameters."""
+    places: list[int] = []
+    means: list[float] = []
+    stds: list[float] = []
+    groups = {name: ParameterSet.of(chosen.present, name, markers).names for name in listed}
+    for name, pair in dict(priors).items():
+        members = groups.get(name, (name,))
+        if not set(members) <= set(chosen.names):
+            raise NameNotFound("fitted parameter", str(name), dict.fromkeys([*listed, *chosen.names]))
+        if not isinstance(pair, tuple | list) or len(pair) != 2:
+            raise ParameterError(f"priors[{name!r}]", pair, "a pair: mean and standard deviation")
+        mean, std = finite_array(f"priors[{name!r}]", pair[0], None), positive_array(f"priors[{name!r}]", pair[1], "")
+        if mean.shape not in ((), (len(members),)) or std.shape not in ((), (len(members),)):
+            raise ParameterError(f"priors[{name!r}]", pair, f"numbers, or arrays of shape ({len(members)},)")
+        places += [chosen.names.index(one) for one in members]
+        means += np.broadcast_to(mean, len(members)).tolist()
+        stds += np.broadcast_to(std, len(members)).tolist()
+    if len(set(places)) < len(places):
+        raise ParameterError("priors", list(priors), "one for each parameter")
+    return Prior(np.array(places, dtype=np.intp), np.array(means), np.array(stds))
+
+
+def _split(measurements: Measurements, validation: Any) -> tuple[Any, Any]:
+    """Rows that are fitted, shape (n,), and what is kept aside: such rows, other measurements, or None."""
+    counted = measurements.mask
+    if validation is None or isinstance(validation, Measurements):
+        return counted, validation
+    words = [validation] if isinstance(validation, str) else validation
+    if isinstance(words, list | tuple) and words and all(isinstance(one, str) for one in words):
+        labels = measurements.labels or ("",) * len(measurements)
+        for word in words:
+            if not any(fnmatchcase(label, word) for label in labels):
+                raise NameNotFound("label", word, dict.fromkeys(labels))
+        aside = np.array([any(fnmatchcase(label, word) for word in words) for label in labels])
+    else:
+        aside = np.asarray(validation)
+    if aside.dtype != bool or aside.shape != counted.shape or not np.any(counted & ~aside) or not np.any(counted & aside):
+        requirement = f"a mask of shape {counted.shape} that leaves rows on both sides, labels, or Measurements"
+        raise ParameterError("validation", validation, requirement)
+    return counted & ~aside, counted & aside

@@ -1,0 +1,259 @@
+r"""What a robot with given parameters would have been measured as, row by row, and the derivatives of that.
+
+The base stands at `t`, turned by `R`, in the frame of the measurements: what is at `x` of the robot is seen at `R x + t`, and
+a load or gravity `f` told there is `R^T f` to the robot. A marker at `o` in its frame is at `x + R_f o`. Actuators are at what
+was commanded plus an offset. Each search for an equilibrium starts from that of the values before.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from typing import NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
+from softrobots.identification.loaded_tree import cross
+from softrobots.identification.measured_robot import frame_of, wrenches_on
+from softrobots.identification.measurements import Measurements
+from softrobots.identification.model_change import ModelChange, model_change
+from softrobots.identification.parameters import ParameterSet
+from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
+from softrobots.model.numbers import LAW
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastic_state import ElasticState
+from softrobots.statics.elastostatics import balanced_state
+from softrobots.statics.loads import Load
+
+_TOLERANCE = 1e-12  # of residuals, relative to the load: derivatives are taken there
+
+
+class Seen(NamedTuple):
+    """What is predicted of a measured quantity."""
+
+    values: FloatArray
+    """As measured, rows first."""
+    difference: FloatArray
+    """Measured minus predicted, shape (n, k); of poses position, then rotation vector; NaN where missing."""
+    slopes: Callable[[], FloatArray]
+    """Returns the derivative of the difference by the parameters, shape (n, k, P)."""
+
+
+class Prediction:
+    """All rows at one set of values."""
+
+    def __init__(self, predictor: Predictor, values: FloatArray, model: SoftModel, states: States) -> None:
+        """Take the equilibria of the rows."""
+        self.predictor, self.values, self.model = predictor, values, model
+        self.at = EquilibriumDerivatives(model, states)
+        """The equilibria, for derivatives."""
+        self._position, turn = predictor.parameters.base(values)
+        self._rotation, self._turning = np.asarray(pin.exp3(turn)), np.asarray(pin.Jexp3(turn))
+        measured = predictor.measurements.measured
+        self.seen = {key: QUANTITIES[key.partition(".")[0]](self, key, values) for key, values in measured.items()}
+        """What is predicted, by the name of the quantity."""
+
+    def differences(self) -> dict[str, FloatArray]:
+        """Measured minus predicted by quantity, shape (n, k); NaN where missing."""
+        return {key: one.difference for key, one in self.seen.items()}
+
+    def slopes(self) -> dict[str, FloatArray]:
+        """Derivatives of the differences by the parameters, shape (n, k, P)."""
+        return {key: one.slopes() for key, one in self.seen.items()}
+
+    def frame(self, name: str) -> tuple[FloatArray, FloatArray]:
+        """Position, shape (n, 3) [m], and rotation, (n, 3, 3), of a frame or marker, in the frame of the measurements."""
+        rotation = self._turned(name)
+        position = self.at.tree.frame(self._frame(name))[2] + rotation @ self._offset(name)
+        return position @ self._rotation.T + self._position, self._rotation @ rotation
+
+    def frame_slopes(self, name: str, *, turned: bool = True) -> FloatArray:
+        """Derivatives of that, shape (n, 6, P), measured axes, position, then rotation; (n, 3, P) if not `turned`."""
+        parameters, marked = self.predictor.parameters, self.predictor.parameters.places("marker")
+        count = 6 if turned or np.any(self._offset(name)) else 3
+        pose = np.tile(np.eye(6)[:count], (len(self.predictor.measurements), 1, 1))
+        slopes = self.along(AdjointRows(self.at, Outputs(pose=pose, frame=self._frame(name))))
+        rotation, offset = self._turned(name), self._offset(name)
+        if count > 3:
+            slopes[:, :3] += cross(np.swapaxes(slopes[:, 3:], 1, 2), (rotation @ offset)[:, None]).swapaxes(1, 2)
+        for number, one in marked:
+            if one.place.names[0] == name:
+                slopes[:, :3, number] += rotation[..., one.place.parts[0]]
+        slopes = np.concatenate([self._rotation @ slopes[:, i : i + 3] for i in range(0, count, 3)], axis=1)
+        seen, turning = self.frame(name)[0] - self._position, self._rotation @ self._turning
+        for number, one in parameters.places("base"):
+            if one.place.names[0] == "position":
+                slopes[:, one.place.parts[0], number] += 1.0
+            else:
+                spin = turning[:, one.place.parts[0]]
+                slopes[:, :3, number] += np.cross(spin, seen)
+                slopes[:, 3:, number] += spin[: count - 3]
+        return slopes if turned else slopes[:, :3]
+
+    def along(self, rows: AdjointRows) -> FloatArray:
+        """Derivatives of outputs of the robot, in its own axes, by all parameters, shape (n, L, P)."""
+        predictor = self.predictor
+        slopes = rows.by_numbers(predictor.change) + rows.by_actuators @ predictor.actuator_slopes
+        turned = predictor.parameters.places("base")
+        for name, by_load in rows.by_loads().items():
+            load = self.at.states.loads[name].reshape(len(slopes), -1, 3)
+            for number, one in turned:
+                if one.place.names[0] == "rotation":
+                    change = np.cross(load, self._turning[:, one.place.parts[0]]).reshape(len(slopes), -1, 1)
+                    slopes[..., number] += (by_load @ change)[..., 0]
+        return slopes
+
+    def _frame(self, name: str) -> str:
+        return frame_of(self.model, name, self.predictor.measurements.markers)
+
+    def _offset(self, name: str) -> FloatArray:
+        return self.predictor.parameters.marker_offset(self.values, name)
+
+    def _turned(self, name: str) -> FloatArray:
+        """Rotation of a frame in the robot, shape (n, 3, 3)."""
+        tree, number = self.at.tree, self.model.frame_id(self._frame(name))
+        body, own = tree.frame(self._frame(name))[0], self.at.numbers["frames"][number, :, :3]
+        return np.asarray(tree.rotation[:, body] @ own if body >= 0 else np.broadcast_to(own, (len(tree.rotation), 3, 3)))
+
+
+class Predictor:
+    """Predictions of measured rows for values of parameters."""
+
+    def __init__(self, parameters: ParameterSet, measurements: Measurements) -> None:
+        """Check that the measurements can be those of the robot.
+
+        Raises:
+            ParameterError: If they are not, see `Measurements.check`.
+            NameNotFound: If the robot has no such frame.
+        """
+        measurements.check(parameters.present)
+        self.parameters, self.measurements = parameters, measurements
+        self.change = ModelChange(len(parameters.names), {})
+        """Derivatives of the model's numbers, as `refresh` left them."""
+        self.actuator_slopes: FloatArray = np.zeros((parameters.present.n_motors, len(parameters.names)))
+        """Derivatives of the actuators by the parameters, shape (n_motors, P)."""
+        for number, one in parameters.places("offset"):
+            self.actuator_slopes[list(one.place.parts), number] = 1.0
+        self._offsets = self.actuator_slopes.copy()
+        self._springs: FloatArray | None = None
+        self._last: Prediction | None = None
+        self._kept: tuple[dict[str, FloatArray], list[Load]] | None = None
+
+    def refresh(self, values: FloatArray) -> None:
+        """Differentiate the model's numbers at given values.
+
+        Raises:
+            ParameterError: If the structure of the robot changes with a parameter there.
+        """
+        self.change = model_change(self.parameters, values)
+        self.actuator_slopes = self._offsets.copy()
+        if self.measurements.relative and "laws" in self.change.by_number:
+            laws = self.change.by_number["laws"].reshape(-1, len(LAW), len(values))
+            self.actuator_slopes += laws[:, LAW.index("rest_length")]
+
+    def at(self, values: FloatArray) -> Prediction:
+        """Return the rows at given values, shape (P,).
+
+        Raises:
+            SoftRobotsError: If the robot refuses the values.
+            ParameterError: If rows have no equilibrium; names them.
+        """
+        if self._last is None or not np.array_equal(self._last.values, values):
+            model = self.parameters.model(values)
+            self._last = Prediction(self, np.array(values), model, self._solve(model, values))
+        return self._last
+
+    def _solve(self, model: SoftModel, values: FloatArray) -> States:
+        measurements, (_, turn) = self.measurements, self.parameters.base(values)
+        motors = measurements.motor_coordinates(model) + self.parameters.motor_offsets(values)
+        loads = {name: np.asarray(wrench) for name, wrench in wrenches_on(model, measurements.loads).items()}
+        if "gravity" in measurements.loads:
+            loads[""] = measurements.loads["gravity"]
+        if np.any(turn):
+            rotation = np.asarray(pin.exp3(turn))
+            loads = {name: (load.reshape(-1, 3) @ rotation).reshape(load.shape) for name, load in loads.items()}
+        starts = np.tile(model.rest, (len(motors), 1)) if self._springs is None else self._springs
+        states = list(self._equilibria(model, motors, loads, starts))
+        lost = [measurements.where(row) for row, state in enumerate(states) if state is None]
+        if lost:
+            words = ", ".join(lost[:10]) + (f" and {len(lost) - 10} more" if len(lost) > 10 else "")
+            requirement = (
+                f"rows with an equilibrium at the values to start from; {words} have none: start from other values, or"
+            )
+            raise ParameterError("measurements", measurements, f"{requirement} leave them out by the mask")
+        found = [state for state in states if state is not None]
+        self._springs = np.array([state.q_springs for state in found])
+        of_actuators, coupling = ([getattr(state.load, name) for state in found] for name in ("motors", "coupling"))
+        tangent = [state.tangent for state in found]
+        return States(motors, self._springs, loads, *(np.array(one) for one in (of_actuators, tangent, coupling)))
+
+    def _equilibria(
+        self, model: SoftModel, motors: FloatArray, loads: dict[str, FloatArray], starts: FloatArray
+    ) -> Iterable[ElasticState | None]:
+        for row, (load, start) in enumerate(zip(self._cases(loads), starts, strict=True)):
+            state = balanced_state(model, motors[row], load, start, tolerance=_TOLERANCE)
+            if state is None:
+                state = balanced_state(model, motors[row], load, model.rest, tolerance=_TOLERANCE)
+            yield state
+
+    def _cases(self, loads: dict[str, FloatArray]) -> list[Load]:
+        """The loads of the rows, made once while they stay the same."""
+        if self._kept is None or any(not np.array_equal(loads[name], self._kept[0][name]) for name in loads):
+            frames = [name for name in loads if name]
+            gravities = [None] * len(self.measurements) if "" not in loads else [tuple(one) for one in loads[""].tolist()]
+            rows = [Load({name: loads[name][row] for name in frames}, one) for row, one in enumerate(gravities)]
+            self._kept = loads, rows
+        return self._kept[1]
+
+
+def difference(measured: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Return measured minus predicted, shape (n, k), NaN where missing.
+
+    Of poses, (n, 4, 4), it is that of positions, then the rotation vector of `R_measured R_predicted^T`.
+    """
+    if measured.ndim == 2:
+        return measured - predicted
+    turns = measured[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2)
+    angles = [pin.log3(turn) if np.isfinite(turn).all() else np.full(3, np.nan) for turn in turns]
+    return np.concatenate([measured[:, :3, 3] - predicted[:, :3, 3], np.reshape(angles, (-1, 3))], axis=1)
+
+
+def _position(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
+    name = key.partition(".")[2]
+    values = prediction.frame(name)[0]
+    return Seen(values, difference(measured, values), lambda: -prediction.frame_slopes(name, turned=False))
+
+
+def _pose(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
+    name = key.partition(".")[2]
+    values = np.tile(np.eye(4), (len(measured), 1, 1))
+    values[:, :3, 3], values[:, :3, :3] = prediction.frame(name)
+    found = difference(measured, values)
+
+    def slopes() -> FloatArray:
+        moved = -prediction.frame_slopes(name)
+        inverse = [pin.Jlog3(pin.exp3(angle)) if np.isfinite(angle).all() else np.eye(3) for angle in found[:, 3:]]
+        return np.concatenate([moved[:, :3], np.array(inverse) @ moved[:, 3:]], axis=1)
+
+    return Seen(values, found, slopes)
+
+
+def _load(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
+    """Loads on the actuators, of which the last are tensions."""
+    states, count = prediction.at.states, measured.shape[1]
+    values = states.actuator_loads[:, -count:]
+    weights = np.tile(np.eye(states.actuator_loads.shape[1])[-count:], (len(values), 1, 1))
+    return Seen(
+        values, difference(measured, values), lambda: -prediction.along(AdjointRows(prediction.at, Outputs(loads=weights)))
+    )
+
+
+QUANTITIES: dict[str, Callable[[Prediction, str, FloatArray], Seen]] = {
+    "positions": _position,
+    "poses": _pose,
+    "motor_torques": _load,
+    "tensions": _load,
+}
+"""What can be measured: by the first word of its name, what is predicted of it."""
