@@ -270,7 +270,7 @@ def test_an_elastic_tendon_should_begin_where_a_section_does() -> None:
         return sr.solve_equilibrium(model, model.relaxed_motors - 0.003, (0.02, 0.0, 0.0)).tip_position
 
     divided = (begin, length - begin)
-    fine = tip(divided, 24)
+    fine = tip(divided, 16)
     off = [np.linalg.norm(tip(lengths, count) - fine) / length for lengths, count in (((length,), 8), (divided, 4))]
     assert off[0] == pytest.approx(5e-3, rel=0.1)
     assert off[1] == pytest.approx(2e-4, rel=0.2)

@@ -84,4 +84,4 @@ def test_any_words_end_with_a_status_and_a_message(command: str, tmp_path: Path,
     ends()
 
 
-EXAMPLES = 25
+EXAMPLES = 15

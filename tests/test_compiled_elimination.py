@@ -338,7 +338,7 @@ def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np
 GRAVITY = np.array([0.5, -1.0, -9.6])
 
 
-WEIGHTLESS = ("arm", "helix", "helix_lumped", "odd", "pcc", "uneven")
+WEIGHTLESS = ("arm", "helix_lumped", "pcc", "uneven")
 HEAVY = ("arm", "helix", "odd", "pcc_forces", "pcc_lumped", "stacked", "tendons", "winding", "coils")
 
 

@@ -72,7 +72,7 @@ CASES = [
     pytest.param(helix, form, turned, id=f"{helix}-{form}-{'left, axis' if turned else 'right, tube'}")
     for row, helix in enumerate(HELICES)
     for column, form in enumerate(FORMS)
-    if form != "midpoint" or row % 3 == 0
+    if row % {"sections": 1, "corrected": 2, "midpoint": 3}[form] == 0
     # Where there is no axis, or one many kilometres away, nothing can stand upright in 16 digits. One of both elsewhere.
     for turned in ((False,) if helix in AWAY else (False, True) if helix == "paper" else ((row + column) % 2 == 1,))
 ]
@@ -344,7 +344,7 @@ def test_any_tube_is_on_its_helix_has_its_mass_and_obeys_the_rules_of_portable_u
 # --- Mass
 
 
-@pytest.mark.parametrize("count", [1, 2, 5])
+@pytest.mark.parametrize("count", [1, 5])
 @pytest.mark.parametrize(
     "form",
     [
