@@ -85,24 +85,23 @@ def test_a_step_of_a_long_chain_is_the_implicit_midpoint_rule(kind: str, rng: np
     assert not unknowns.is_unrolled
     run: Any = make_run(make_motion_program(unknowns), "python")
     layout, n, m, h = run.layout, model.n_springs, model.n_motors, 1e-3
-    for _ in range(2):
-        w, path, damping, given = started(model, run, rng, h)
-        y0, v0 = given["position"], given["velocity"]
-        assert run.motion_step(w) == 0
-        y1, a = (np.array(w[place : place + n]) for place in (layout.position, layout.acceleration))
-        np.testing.assert_allclose(y1, y0 + h * v0 + h**2 / 2 * a, rtol=0, atol=1e-15)  # in one step; rounding
-        equations = EquationsOfMotion(model, GRAVITY, np.diag(damping))
-        x = np.concatenate([path[1], y0 + h / 2 * v0 + h**2 / 4 * a])
-        rates = np.concatenate([(path[2] - path[0]) / h, v0 + h / 2 * a])
-        changes = np.concatenate([4 * (path[2] - 2 * path[1] + path[0]) / h**2, a])
-        wrench = {model.tip: np.concatenate([given["force"], np.zeros(3)])}
-        error = equations.balance(x, rates, changes, wrench)[m:]
-        # A change of 1e-13 in the middle is one of K 1e-13 + M 1e-13 / (h^2 / 4) in the torques.
-        size = model.chain().stiffness.max() + np.abs(equations.mass_matrix(x)).max() * 4 / h**2
-        assert np.abs(error).max() < 1e-12 * size
-        run.place_at(w, 1.0)
-        q = model.configuration(path[2], y1)
-        np.testing.assert_allclose(w[layout.tip : layout.tip + 3], frame_placement(model, q, model.tip).translation, atol=1e-12)
+    w, path, damping, given = started(model, run, rng, h)
+    y0, v0 = given["position"], given["velocity"]
+    assert run.motion_step(w) == 0
+    y1, a = (np.array(w[place : place + n]) for place in (layout.position, layout.acceleration))
+    np.testing.assert_allclose(y1, y0 + h * v0 + h**2 / 2 * a, rtol=0, atol=1e-15)  # in one step; rounding
+    equations = EquationsOfMotion(model, GRAVITY, np.diag(damping))
+    x = np.concatenate([path[1], y0 + h / 2 * v0 + h**2 / 4 * a])
+    rates = np.concatenate([(path[2] - path[0]) / h, v0 + h / 2 * a])
+    changes = np.concatenate([4 * (path[2] - 2 * path[1] + path[0]) / h**2, a])
+    wrench = {model.tip: np.concatenate([given["force"], np.zeros(3)])}
+    error = equations.balance(x, rates, changes, wrench)[m:]
+    # A change of 1e-13 in the middle is one of K 1e-13 + M 1e-13 / (h^2 / 4) in the torques.
+    size = model.chain().stiffness.max() + np.abs(equations.mass_matrix(x)).max() * 4 / h**2
+    assert np.abs(error).max() < 1e-12 * size
+    run.place_at(w, 1.0)
+    q = model.configuration(path[2], y1)
+    np.testing.assert_allclose(w[layout.tip : layout.tip + 3], frame_placement(model, q, model.tip).translation, atol=1e-12)
 
 
 @pytest.mark.parametrize("kind", ["rod", "sections", "tensions"])

@@ -171,7 +171,7 @@ def compare_with_minima(stiffness: np.ndarray, beyond: float, rng: np.random.Gen
     return len(ends)
 
 
-@pytest.mark.parametrize("difference", [1e-2, 1e-3, 3e-5, 1e-5, 1e-6, 1e-8])
+@pytest.mark.parametrize("difference", [1e-2, 3e-5, 1e-8])
 def test_springs_that_are_nearly_equal_have_all_four_stable_branches(difference: float, rng: np.random.Generator) -> None:
     """Also where the second branches leave the path a little later, unstable, and become stable where they are crossed."""
     stiffness = 172.71 * np.array([1.0, 1.0 + difference, 1.0, 1.0 + difference])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -27,6 +28,7 @@ ROBOTS: dict[str, Any] = {
 }
 
 
+@cache
 def model(name: str) -> sr.SoftModel:
     return sr.load_model(ROBOTS[name])
 
