@@ -168,6 +168,24 @@ def test_pulls_are_measured_from_the_relaxed_length_that_is_fitted() -> None:
     np.testing.assert_allclose(sr.identify(TENDON, data, names).solution, true, rtol=1e-9)
 
 
+def test_rows_of_a_robot_with_dry_friction_come_in_order() -> None:
+    robot = replace(TENDON, bending_friction=4e-3)
+    names, true = ("young_modulus", "bending_friction"), [40e9, 6e-3]
+    chosen = ParameterSet.of(robot, names)
+    model, pulls = chosen.model(true), np.outer([0.0, 1.0, 2.0, 1.0, 0.0, -1.0, 0.0], [8e-4, -4e-4, -4e-4] * 2)
+    commanded, tips, before = model.relaxed_motors - pulls, [], None
+    for motors in commanded:
+        before = sr.solve_equilibrium(model, motors, previous=before, tolerance=1e-12)
+        tips.append(before.tip_position)
+    assert np.linalg.norm(tips[4] - tips[0]) > 1e-3  # it remembers
+    data = sr.Measurements(commanded, tip_position=tips)
+    found = sr.identify(robot, data, names, validation=np.arange(7) == 5)
+    np.testing.assert_allclose(found.solution, true, rtol=1e-8)
+    assert found.validation is not None
+    assert found.validation.errors["positions.tip"][0] < 1e-10
+    assert found.fitted.n_counted == 6
+
+
 @pytest.fixture(scope="module")
 def noisy() -> sr.Measurements:
     """Twenty rows of an arm with a millimetre of noise, in five blocks."""

@@ -34,6 +34,12 @@ class Comparison(NamedTuple):
     not counted."""
 
     @property
+    def n_counted(self) -> int:
+        """Number of rows that count."""
+        there = [np.isfinite(values).any(axis=1) for values in self.residuals.values()]
+        return int(np.any(there, axis=0).sum())
+
+    @property
     def errors(self) -> dict[str, tuple[float, str]]:
         """Root mean square of the residuals by quantity, of positions of their length, and unit."""
         found = {}
@@ -165,7 +171,7 @@ class Identification:
         lines = [f"{self.message}, {len(self.history.cost)} steps, loss {self.loss}", "", *_aligned(table), ""]
         for title, comparison in (("fitted", self.fitted), ("kept aside", self.validation)):
             if comparison is not None:
-                lines.append(f"root mean square errors, {len(comparison.measurements)} rows {title}:")
+                lines.append(f"root mean square errors, {comparison.n_counted} rows {title}:")
                 lines += _aligned([(f"  {key}", f"{error:.4g}", unit) for key, (error, unit) in comparison.errors.items()])
         if self.outliers:
             where = self.fitted.measurements.where
@@ -184,8 +190,8 @@ class Identification:
         return np.asarray(uncertainty.covariance * np.outer(rates, rates))
 
 
-def identification_of(fit: Fit, aside: Measurements | None) -> Identification:
-    """Return the result of a fit, with predictions of measurements that were kept aside."""
+def identification_of(fit: Fit, aside: Any) -> Identification:
+    """Return the result of a fit, with predictions of what was kept aside: measurements, rows of the same course, or None."""
     predictor, weights = fit.predictor, fit.weights
     prediction, residuals, slopes = fit.at_end()
     parameters, information = predictor.parameters, fit.information
@@ -205,9 +211,14 @@ def identification_of(fit: Fit, aside: Measurements | None) -> Identification:
     worst = outliers(slopes, residuals, prior=information)
     means = {predictor.parameters.names[i]: pair for i, *pair in zip(*map(np.ndarray.tolist, fit.prior), strict=True)}
     validation = None
-    if aside is not None:
+    if isinstance(aside, Measurements):
         others = Predictor(parameters, aside).at(fit.values)
         validation = _comparison(aside, others, {key: np.ones(one.shape, bool) for key, one in others.differences().items()})
+    elif aside is not None:
+        rows_aside = {key: np.repeat(aside[:, None], one.shape[1], axis=1) for key, one in prediction.differences().items()}
+        whole = _comparison(predictor.measurements, prediction, rows_aside)
+        parts = ({key: one[aside] for key, one in part.items()} for part in (whole.predicted, whole.residuals))
+        validation = Comparison(whole.measurements[aside], *parts)
     return Identification(
         model=prediction.model,
         parameters=parameters.parameters,

@@ -85,12 +85,11 @@ def identify(
     listed = [parameters] if isinstance(parameters, str) else list(parameters)
     prior = _prior(chosen, listed, measurements.markers, priors or {})
     counted, aside = _split(measurements, validation)
-    if chosen.present.structure.friction is None:  # rows in any order
-        rows, counted = measurements[counted], np.ones(int(counted.sum()), dtype=bool)
-    else:
-        rows = measurements
-    others = aside if aside is None or isinstance(aside, Measurements) else measurements[aside]
-    if others is not None:
+    in_order = chosen.present.structure.friction is not None
+    rows = measurements if in_order else measurements[counted]
+    counted = counted if in_order else np.ones(len(rows), dtype=bool)
+    others = aside if in_order or aside is None or isinstance(aside, Measurements) else measurements[aside]
+    if isinstance(others, Measurements):
         others.check(chosen.present)
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
@@ -98,7 +97,7 @@ def identify(
         predictor = Predictor(chosen, rows)
         weights = Weights.of(rows.std, predictor.at(values[0]).differences(), counted)
         robust = loss if weights.known else "linear"
-        if every > 1 and chosen.present.structure.friction is None:
+        if every > 1 and not in_order:
             few = Predictor(chosen, rows[::every])
             quick = _best(few, weights.every(every), prior, robust, steps, values, most)
             values, message = [quick.values], quick.message

@@ -3,6 +3,9 @@ r"""What a robot with given parameters would have been measured as, row by row, 
 The base stands at `t`, turned by `R`, in the frame of the measurements: what is at `x` of the robot is seen at `R x + t`, and
 a load or gravity `f` told there is `R^T f` to the robot. A marker at `o` in its frame is at `x + R_f o`. Actuators are at what
 was commanded plus an offset. Each search for an equilibrium starts from that of the values before.
+
+A robot with dry friction remembers: each row comes from the row before, the first from rest, and derivatives, which go through
+all that it remembers, are differences of the whole course. Those of all other robots are in closed form.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
+from softrobots.model.friction_coordinates import after_step, untouched
 from softrobots.model.numbers import LAW
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState
@@ -28,6 +32,7 @@ from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.loads import Load
 
 _TOLERANCE = 1e-12  # of residuals, relative to the load: derivatives are taken there
+_STEP = 1e-6  # of differences of a course, relative
 
 
 class Seen(NamedTuple):
@@ -61,7 +66,20 @@ class Prediction:
 
     def slopes(self) -> dict[str, FloatArray]:
         """Derivatives of the differences by the parameters, shape (n, k, P)."""
+        if self.predictor.in_order:
+            return self._slopes_of_course()
         return {key: one.slopes() for key, one in self.seen.items()}
+
+    def _slopes_of_course(self) -> dict[str, FloatArray]:
+        slopes = {key: np.zeros((*values.shape, len(self.values))) for key, values in self.differences().items()}
+        for number, one in enumerate(self.predictor.parameters.parameters):
+            step = _STEP * (abs(self.values[number]) or 1.0)
+            ends = np.clip(self.values[number] + np.array([-step, step]), one.lower, one.upper)
+            low, high = (np.where(np.arange(len(self.values)) == number, end, self.values) for end in ends)
+            below, above = (self.predictor.course(values).differences() for values in (low, high))
+            for key, slope in slopes.items():
+                slope[..., number] = (above[key] - below[key]) / (ends[1] - ends[0])
+        return slopes
 
     def frame(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Position, shape (n, 3) [m], and rotation, (n, 3, 3), of a frame or marker, in the frame of the measurements."""
@@ -130,6 +148,8 @@ class Predictor:
         """
         measurements.check(parameters.present)
         self.parameters, self.measurements = parameters, measurements
+        self.in_order = parameters.present.structure.friction is not None
+        """Whether the robot has dry friction, so that each row comes from the row before."""
         self.change = ModelChange(len(parameters.names), {})
         """Derivatives of the model's numbers, as `refresh` left them."""
         self.actuator_slopes: FloatArray = np.zeros((parameters.present.n_motors, len(parameters.names)))
@@ -147,6 +167,8 @@ class Predictor:
         Raises:
             ParameterError: If the structure of the robot changes with a parameter there.
         """
+        if self.in_order:
+            return
         self.change = model_change(self.parameters, values)
         self.actuator_slopes = self._offsets.copy()
         if self.measurements.relative and "laws" in self.change.by_number:
@@ -161,9 +183,13 @@ class Predictor:
             ParameterError: If rows have no equilibrium; names them.
         """
         if self._last is None or not np.array_equal(self._last.values, values):
-            model = self.parameters.model(values)
-            self._last = Prediction(self, np.array(values), model, self._solve(model, values))
+            self._last = self.course(values)
         return self._last
+
+    def course(self, values: FloatArray) -> Prediction:
+        """Return the same, solved anew."""
+        model = self.parameters.model(values)
+        return Prediction(self, np.array(values), model, self._solve(model, values))
 
     def _solve(self, model: SoftModel, values: FloatArray) -> States:
         measurements, (_, turn) = self.measurements, self.parameters.base(values)
@@ -192,10 +218,14 @@ class Predictor:
     def _equilibria(
         self, model: SoftModel, motors: FloatArray, loads: dict[str, FloatArray], starts: FloatArray
     ) -> Iterable[ElasticState | None]:
+        now, before = untouched(model), np.asarray(model.rest)
         for row, (load, start) in enumerate(zip(self._cases(loads), starts, strict=True)):
-            state = balanced_state(model, motors[row], load, start, tolerance=_TOLERANCE)
-            if state is None:
+            first = before if self.in_order else start
+            state = balanced_state(now, motors[row], load, first, tolerance=_TOLERANCE)
+            if state is None and not self.in_order:
                 state = balanced_state(model, motors[row], load, model.rest, tolerance=_TOLERANCE)
+            if state is not None and self.in_order:
+                now, before = after_step(now, motors[row], state.q_springs), state.q_springs
             yield state
 
     def _cases(self, loads: dict[str, FloatArray]) -> list[Load]:
