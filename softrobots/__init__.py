@@ -37,8 +37,10 @@ from softrobots.dynamics.linear_model import LinearModel, linearize
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
+from softrobots.identification.cross_validation import CrossValidation, cross_validate
 from softrobots.identification.identification import Identification
 from softrobots.identification.identify import identify
+from softrobots.identification.informative_poses import InformativePoses, informative_poses
 from softrobots.identification.measurements import Measurements
 from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
@@ -72,6 +74,7 @@ __all__ = [
     "AssumedStiffnessWarning",
     "ClosedLoop",
     "ClusterError",
+    "CrossValidation",
     "DescriptionError",
     "Equilibrium",
     "EquilibriumBranch",
@@ -82,6 +85,7 @@ __all__ = [
     "IkSolution",
     "ImposedDisplacement",
     "InflatableArm",
+    "InformativePoses",
     "InputShaper",
     "LinearModel",
     "LinkLimits",
@@ -119,6 +123,7 @@ __all__ = [
     "compliance",
     "constant_curvature",
     "critical_load",
+    "cross_validate",
     "damping_time_from_decrement",
     "distributed_force",
     "elastostatic_jacobian",
@@ -129,6 +134,7 @@ __all__ = [
     "helix",
     "identify",
     "inflated_beam",
+    "informative_poses",
     "input_shaper",
     "linearize",
     "load_model",

@@ -538,6 +538,11 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("identification", {"rows_covariance": np.full((2, 2), np.nan)}, "finite"),
         ("identification", {"fitted_counted_0": np.ones((2, 3))}, "truth values"),
         ("identification", {"outliers": np.array([7])}, "do not fit"),
+        ("cross_validation", {"errors": np.ones((2, 3))}, "shape"),
+        ("cross_validation", {"errors": -np.ones((2, 2))}, "not errors"),
+        ("cross_validation", {"facts": np.array("[" * DEEP)}, "not JSON"),
+        ("cross_validation", {"facts": np.array('{"sets": {"k": [7]}, "families": ["a", "b"], "unit": "m"}')}, "7 is no name"),
+        ("cross_validation", {"facts": np.array('{"sets": [], "families": [], "unit": "m"}')}, "items"),
         ("ik_solution", {"steps": np.array(2.5)}, "must be an array of non-negative integers"),
     ],
 )

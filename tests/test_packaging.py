@@ -33,16 +33,16 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
 
 
 PUBLIC = """
-EARTH_GRAVITY PD ROBOTS AssumedStiffnessWarning ClosedLoop ClusterError DescriptionError Equilibrium EquilibriumBranch
-EquilibriumNotFound FileFormatError HelixTube Identification IkSolution ImposedDisplacement InflatableArm InputShaper
-LinearModel LinkLimits LoadEstimate LoadNotFound Measurements MissingDependency Motion MotionState NameNotFound
-NeutralEquilibrium NoCriticalLoad NotConverged OutputError OutputExists ParameterError Path3D PccArm Route SelfIntersection
-ShapedTrajectory SoftModel SoftRobotsError SpringGroup Stability StraightTube TargetUnreachable TendonArm Trajectory
-VibrationModes Viewer ViewerError Workspace __version__ compliance constant_curvature critical_load
-damping_time_from_decrement distributed_force elastostatic_jacobian estimate_load export follow_trajectory grown_coordinates
-helix identify inflated_beam input_shaper linearize load_model load_result measured_decay mount post_buckling_branches
-quintic read_waypoints residual_vibration sample_workspace save_csv save_result shape_input simulate solve_equilibrium
-solve_ik solve_imposed_displacement straight_line vibration_modes view waypoints with_springs
+EARTH_GRAVITY PD ROBOTS AssumedStiffnessWarning ClosedLoop ClusterError CrossValidation DescriptionError Equilibrium
+EquilibriumBranch EquilibriumNotFound FileFormatError HelixTube Identification IkSolution ImposedDisplacement InflatableArm
+InformativePoses InputShaper LinearModel LinkLimits LoadEstimate LoadNotFound Measurements MissingDependency Motion
+MotionState NameNotFound NeutralEquilibrium NoCriticalLoad NotConverged OutputError OutputExists ParameterError Path3D PccArm
+Route SelfIntersection ShapedTrajectory SoftModel SoftRobotsError SpringGroup Stability StraightTube TargetUnreachable
+TendonArm Trajectory VibrationModes Viewer ViewerError Workspace __version__ compliance constant_curvature critical_load
+cross_validate damping_time_from_decrement distributed_force elastostatic_jacobian estimate_load export follow_trajectory
+grown_coordinates helix identify inflated_beam informative_poses input_shaper linearize load_model load_result measured_decay
+mount post_buckling_branches quintic read_waypoints residual_vibration sample_workspace save_csv save_result shape_input
+simulate solve_equilibrium solve_ik solve_imposed_displacement straight_line vibration_modes view waypoints with_springs
 """
 """What users import from `softrobots`: a name is added here on purpose, and none disappears unnoticed."""
 

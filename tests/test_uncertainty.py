@@ -14,7 +14,6 @@ import softrobots as sr
 from softrobots.identification.gauges import find_gauges
 from softrobots.identification.uncertainty import (
     outliers,
-    root_mean_squares,
     standardised_residuals,
     uncertainty_from_blocks,
     uncertainty_from_rows,
@@ -171,10 +170,6 @@ def test_planted_outliers_are_found_and_hardly_any_other() -> None:
         assert outliers(jacobian, fitted(jacobian, measured)[1])[:2].tolist() == [17, 90]
     assert false < 24
     assert len(outliers(jacobian, 1e-12 * rng.standard_t(1.0, 200))) == 0  # rounding errors are none
-
-
-def test_root_mean_squares_are_told_by_quantity() -> None:
-    assert root_mean_squares([3.0, 1.0, 4.0], ["torque", "tip", "torque"]) == pytest.approx({"torque": 12.5**0.5, "tip": 1.0})
 
 
 @pytest.mark.parametrize(

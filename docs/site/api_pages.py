@@ -97,7 +97,11 @@ PAGES = {
     "identification": ApiPage(
         "Identification",
         "What was measured of a robot, and the parameters that explain it.",
-        (*_top("Measurements", "identify", "Identification"), "softrobots.identification.measurement_columns.read_columns"),
+        (
+            *_top("Measurements", "identify", "Identification"),
+            *_top("cross_validate", "CrossValidation", "informative_poses", "InformativePoses"),
+            "softrobots.identification.measurement_columns.read_columns",
+        ),
     ),
     "inflated_beam": ApiPage("inflated_beam", "One inflated link as a beam.", _top("inflated_beam")),
     "constant_curvature": ApiPage(

@@ -5,12 +5,13 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array
 from softrobots.core.errors import ParameterError
+from softrobots.identification.parameter_names import Parameter
 from softrobots.identification.uncertainty import UNDETERMINED, information, scaled_directions
 
 _STEP = 0.01  # largest change told, relative to what counts as large
@@ -34,26 +35,6 @@ _MEANING = {
 """What a kind of combinations is, and what helps."""
 
 
-class NamedParameter(Protocol):
-    """What is needed of a parameter."""
-
-    @property
-    def name(self) -> str:
-        """Its name."""
-
-    @property
-    def unit(self) -> str:
-        """Its unit."""
-
-    @property
-    def value(self) -> float:
-        """Its value."""
-
-    @property
-    def logarithmic(self) -> bool:
-        """Whether its logarithm is fitted."""
-
-
 @dataclass(frozen=True)
 class Gauge:
     """Parameters that only together change a prediction, and a change of them that does not."""
@@ -75,7 +56,7 @@ class Gauge:
         return self.text
 
 
-def find_gauges(jacobian: Any, parameters: Sequence[NamedParameter], *, prior: Any = 0.0) -> tuple[Gauge, ...]:
+def find_gauges(jacobian: Any, parameters: Sequence[Parameter], *, prior: Any = 0.0) -> tuple[Gauge, ...]:
     """Return the smallest groups of parameters that the measurements do not tell apart.
 
     A group is a null vector of the Jacobian from which no member can be left out: found from the singular vector of the
@@ -108,7 +89,7 @@ def find_gauges(jacobian: Any, parameters: Sequence[NamedParameter], *, prior: A
     return tuple(found)
 
 
-def _size(parameter: NamedParameter) -> float:
+def _size(parameter: Parameter) -> float:
     """A change of a parameter that counts as large."""
     return 1.0 if parameter.logarithmic or parameter.unit in ("m", "rad") else max(abs(parameter.value), 1.0)
 
@@ -143,9 +124,7 @@ def _effects(rows: FloatArray, prior: FloatArray, some: list[int], change: Float
     return np.asarray(np.abs(change) * np.sqrt(np.sum(rows[:, some] ** 2, axis=0) + prior[some]))
 
 
-def _told(
-    rows: FloatArray, sizes: FloatArray, parameters: Sequence[NamedParameter], members: list[int], steps: FloatArray
-) -> Gauge:
+def _told(rows: FloatArray, sizes: FloatArray, parameters: Sequence[Parameter], members: list[int], steps: FloatArray) -> Gauge:
     """The combination of some parameters in words."""
     steps = steps * np.copysign(_STEP / np.max(np.abs(steps) / sizes[members]), steps[0])
     chosen = [parameters[member] for member in members]
@@ -159,7 +138,7 @@ def _told(
     return Gauge(tuple(members), tuple(names), steps, change, kind, text)
 
 
-def _amounts(chosen: Sequence[NamedParameter], steps: FloatArray, sign: float) -> str:
+def _amounts(chosen: Sequence[Parameter], steps: FloatArray, sign: float) -> str:
     """Names and sizes of the steps of one sign, those of the same size together."""
     together: dict[str, list[str]] = {}
     for one, step in zip(chosen, steps, strict=True):
@@ -169,7 +148,7 @@ def _amounts(chosen: Sequence[NamedParameter], steps: FloatArray, sign: float) -
     return " and ".join(f"{' and '.join(names)} by {amount}" for amount, names in together.items())
 
 
-def _kind(chosen: Sequence[NamedParameter], steps: FloatArray) -> str:
+def _kind(chosen: Sequence[Parameter], steps: FloatArray) -> str:
     """The kind of a combination, from the names and units of its members and how they change."""
     names = [one.name for one in chosen]
     scales = [1.0 if one.logarithmic else one.value or np.inf for one in chosen]

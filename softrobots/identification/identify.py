@@ -82,8 +82,7 @@ def identify(
     loads = [one.name for one in chosen.parameters if one.place.kind in ("motor", "force", "wrench", "gravity")]
     if loads:
         raise ParameterError("parameters", loads[0], "no load or actuator coordinate: measurements give those")
-    listed = [parameters] if isinstance(parameters, str) else list(parameters)
-    prior = _prior(chosen, listed, measurements.markers, priors or {})
+    prior = prior_of(chosen, parameters, priors or {})
     counted, aside = _split(measurements, validation)
     in_order = chosen.present.structure.friction is not None
     rows = measurements if in_order else measurements[counted]
@@ -151,14 +150,19 @@ def _starts(chosen: ParameterSet, seed: int, count: int) -> list[FloatArray]:
     return found
 
 
-def _prior(chosen: ParameterSet, listed: Sequence[str], markers: Mapping[str, str], priors: Any) -> Prior:
-    """The priors by scalar parameter, from names of scalars, or of several as they are in the list of parameters."""
+def prior_of(chosen: ParameterSet, parameters: str | Sequence[str], priors: Mapping[str, tuple[Any, Any]]) -> Prior:
+    """Return the priors by scalar parameter, from names of scalars, or of several as they are in the list of parameters.
+
+    Raises:
+        ParameterError: If one is no pair of finite numbers, or a parameter has two.
+        NameNotFound: If there is no such parameter among those of the list.
+    """
+    listed = [parameters] if isinstance(parameters, str) else list(parameters)
     places: list[int] = []
     means: list[float] = []
     stds: list[float] = []
-    groups = {name: ParameterSet.of(chosen.present, name, markers).names for name in listed}
     for name, pair in dict(priors).items():
-        members = groups.get(name, (name,))
+        members = ParameterSet.of(chosen.present, name, chosen.markers).names if name in listed else (name,)
         if not set(members) <= set(chosen.names):
             raise NameNotFound("fitted parameter", str(name), dict.fromkeys([*listed, *chosen.names]))
         if not isinstance(pair, tuple | list) or len(pair) != 2:

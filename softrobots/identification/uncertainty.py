@@ -7,7 +7,6 @@ and the information :math:`\Lambda` of the priors, one over the square of their 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -166,13 +165,6 @@ def outliers(jacobian: Any, residuals: Any, *, prior: Any = 0.0, least: float = 
     limit = -ndtri((1.0 - CONFIDENCE) / (2.0 * max(len(size), 1)))
     order = np.argsort(-size, kind="stable")
     return np.asarray(order[size[order] > limit])
-
-
-def root_mean_squares(residuals: Any, quantities: Sequence[str]) -> dict[str, float]:
-    """Return the root mean square of the residuals of each quantity, by its name, in the order in which they come."""
-    numbers = finite_array("residuals", residuals, (len(quantities),))
-    names = np.asarray(quantities, dtype=str)
-    return {str(name): float(np.sqrt(np.mean(numbers[names == name] ** 2))) for name in dict.fromkeys(names.tolist())}
 
 
 @dataclass(frozen=True)

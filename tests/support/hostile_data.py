@@ -289,6 +289,9 @@ def results() -> dict[str, Any]:
             np.array([[0.1, 0.2], [0.3, 0.4]]), tip_position=[[1.0, 2.0, np.nan], [3.0, 4.0, 5.0]], std=0.1, labels=["a", "b"]
         ),
         "identification": sr.identify(robot, rows, ("stiffness", "base.position.z"), validation="b"),
+        "cross_validation": sr.CrossValidation(
+            {"k": ("stiffness",), "all": ("stiffness", "base.position.x")}, ("a", "b"), np.array([[2.0, 3.0], [1.0, 1.5]]), "m"
+        ),
     }
 
 
@@ -324,6 +327,9 @@ def read_result(file: Path) -> None:
         return
     if isinstance(result, sr.Measurements):
         finite(result.q_motors, *result.loads.values(), *result.std.values())
+        return
+    if isinstance(result, sr.CrossValidation):
+        finite(result.errors, result.means, result.standard_errors)
         return
     if isinstance(result, tuple):
         finite(*(branch.forces for branch in result), *(branch.energy for branch in result))
