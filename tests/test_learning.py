@@ -159,3 +159,57 @@ def test_what_has_no_compiled_derivatives_is_refused_by_name() -> None:
         Differentiable("equilibrium", sr.InflatableArm(), "stifness", **options)
     with pytest.raises(sr.ParameterError, match="three motors"):
         Differentiable("estimate", sr.InflatableArm(link_lengths=(0.6,)), (), **options)
+
+
+@pytest.mark.study
+@pytest.mark.shortened(500, 100_000)
+def test_derivatives_of_random_cases(cases: int) -> None:
+    """All inputs change at once, in a random direction: rates are differences of batches, and both modes are transposes.
+
+    Where a wall begins to go slack within a step, differences are worse than derivatives; those of two steps say so.
+    """
+    random, checked = np.random.default_rng(23), 0
+    for robot, values, gravity in ROBOTS.values():
+        solver = Differentiable(
+            "equilibrium", replace(robot, **values), list(values), gravity=gravity, **OPTIONS | {"failed": "nan"}
+        )
+        slack = robot.moment_law == "slack_wall"
+        step = 0.1 * STEP if slack else STEP
+        count, drawn = min(2000, cases // len(ROBOTS)), 0
+        while drawn < cases // len(ROBOTS):
+            drawn += count
+            parameters = np.array(list(values.values())) * random.uniform(0.9, 1.1, len(values))
+            inputs = [
+                random.uniform(-1.0, 1.0, (count, solver.model.n_motors)),
+                random.normal(size=(count, 3)) * 5.0,
+                parameters,
+            ]
+            rates = [random.normal(size=one.shape) for one in inputs[:2]] + [parameters * random.normal(size=len(values))]
+
+            def moved(by: float, inputs: Any = inputs, rates: Any = rates, solver: Any = solver) -> FloatArray:
+                found = solver.solve(*(one + by * rate for one, rate in zip(inputs, rates, strict=True)))
+                return np.concatenate(found, axis=1)
+
+            results = solver.solve(*inputs)
+            slopes = np.concatenate(solver.push(inputs, results, rates), axis=1)
+            ends = [moved(place * step) for place in (-2.0, -1.0, -0.5, 0.5, 1.0, 2.0)]
+            wide, near = (
+                (8.0 * (b - a) - (d - c)) / (12.0 * apart)
+                for a, b, c, d, apart in (
+                    (ends[1], ends[4], ends[0], ends[5], step),
+                    (ends[2], ends[3], ends[1], ends[4], 0.5 * step),
+                )
+            )
+            error, doubt = (np.abs(one).max(axis=1) for one in (near - slopes, near - wide))
+            good = np.isfinite(error)
+            tolerated = TOLERANCE * (1.0 + np.abs(slopes).max(axis=1))
+            assert np.mean(error <= tolerated) > 0.9
+            if slack:
+                tolerated += 1e3 * doubt
+            assert np.all(error[good] <= tolerated[good])
+            weights = [random.normal(size=one.shape) for one in results]
+            pulled = solver.pull(inputs, results, weights, [(count,), (count,), ()])
+            backward = sum(float((np.asarray(a) * b).sum()) for a, b in zip(pulled, rates, strict=True))
+            assert np.nansum(np.concatenate(weights, axis=1) * slopes) == pytest.approx(backward, rel=1e-9)
+            checked += int(good.sum())
+    assert checked > 0.95 * cases
