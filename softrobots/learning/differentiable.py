@@ -91,7 +91,9 @@ class Differentiable:
         lead = _lead(inputs)
         count = math.prod(lead)
         motors, loads = (_flat(one, lead) for one in inputs[:2])
-        bad = unusable(motors) | unusable(loads) | (np.abs(motors).max(axis=1, initial=0.0) > LARGEST_POSITION)
+        bad = unusable(motors) | unusable(loads)
+        if motors.size and not (motors.min() >= -LARGEST_POSITION and motors.max() <= LARGEST_POSITION):
+            bad = bad | (np.abs(motors).max(axis=1) > LARGEST_POSITION)
         if np.any(bad):
             self._refuse_input(bad)
             bad = np.broadcast_to(bad, count)
@@ -175,7 +177,8 @@ class Differentiable:
         return np.ascontiguousarray(np.reshape(columns, (-1, self.model.n_motors)).T)
 
     def _true(self, motors: FloatArray, values: tuple[float, ...]) -> FloatArray:
-        return motors + self._offsets @ np.array(values) if np.any(self._offsets) else motors
+        offsets = self._offsets @ np.array(values)
+        return motors + offsets if np.any(offsets) else motors
 
     def _cases(
         self, inputs: Sequence[Any], results: Sequence[Any], lead: tuple[int, ...]

@@ -13,10 +13,18 @@ from softrobots.compiled.settings import *
 def respond_batch(inputs: Rows, places: Places, outputs: Rows, result_places: Places, sums: Any, first: int, last: int) -> None:
     """Compute rates or weights; add the weights of the numbers of the robot to row `first // CHUNK` of the sums."""
     lanes = zeros(LANE_SIZE * LANES)
+    size = sums.shape[1] * LANES
+    total = zeros(size + 1)
     for begin in range(first, last, LANES):
         load_block(lanes, inputs, places, begin, last)
         respond_lanes(lanes)
         store_block(lanes, outputs, result_places, begin, last)
-        for j in range(sums.shape[1]):
-            for lane in range(min(LANES, last - begin)):
-                sums[first // CHUNK, j] += lanes[(NUMBER_WEIGHTS + j) * LANES + lane]
+        if last - begin >= LANES:
+            for k in range(size):
+                total[k] += lanes[NUMBER_WEIGHTS * LANES + k]
+        else:
+            for k in range(size):
+                if k % LANES < last - begin:
+                    total[k] += lanes[NUMBER_WEIGHTS * LANES + k]
+    for k in range(size):
+        sums[first // CHUNK, k // LANES] += total[k]
