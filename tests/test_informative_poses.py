@@ -145,7 +145,11 @@ def test_poses_of_frames_are_candidates_whatever_their_rotation() -> None:
         ({"candidates": [[np.nan, 0.0]]}, sr.ParameterError, "finite numbers"),
         ({"parameters": ("stiffness", "tail")}, sr.NameNotFound, "stiffness"),
         ({"mass": None}, sr.ParameterError, "tell them apart; not so stiffness"),
-        ({"parameters": ("base.rotation.z", "motor[1].offset")}, sr.ParameterError, "yaw of the base against the azimuths"),
+        (
+            {"parameters": ("base.rotation.z", "motor[1].offset")},
+            sr.ParameterError,
+            "orientation of the base (its yaw, say) against angles",
+        ),
     ],
 )
 def test_what_cannot_be_chosen_is_refused(change: dict[str, Any], error: type[Exception], message: str) -> None:

@@ -22,9 +22,9 @@ _FIX = "fix one of them or give it a prior"
 _MEANING = {
     "scale": "the scale of the stiffness: no force is known that it could be compared with; measure under weights or other"
     " known forces, or measure motor torques or tensions, or fix one of them",
-    "azimuths": f"the yaw of the base against the azimuths of the actuators; {_FIX}",
+    "azimuths": f"the orientation of the base (its yaw, say) against angles of the actuators or at rest; {_FIX}",
     "place": f"the place of the base against the offsets of markers; {_FIX}, or measure in postures that turn the marker",
-    "preloads": f"the common preload against the single ones; {_FIX}, or measure tensions",
+    "preloads": f"preloads, common and single ones, that are felt only together; {_FIX}, or measure tensions",
     "product": f"only as a product; {_FIX}",
     "ratio": f"only as a ratio; {_FIX}",
     "sum": f"only as a sum; {_FIX}",
@@ -154,6 +154,8 @@ def _kind(chosen: Sequence[Parameter], steps: FloatArray) -> str:
     scales = [1.0 if one.logarithmic else one.value or np.inf for one in chosen]
     relative = steps / np.array(scales)
     forces = all(re.search(r"\b(N|Pa|kg)\b", one.unit) for one in chosen)
+    if len(chosen) > 1 and all(re.search(r"pretension|preload|slack|motor.*offset", name) for name in names):
+        return "preloads"
     if forces and np.ptp(relative) <= _SAME * np.max(np.abs(relative)) and np.all(relative != 0.0):
         return "scale"
     if len(chosen) == 1:
@@ -162,8 +164,6 @@ def _kind(chosen: Sequence[Parameter], steps: FloatArray) -> str:
         return "azimuths"
     if all(re.match(r"(base|marker)\.", name) for name in names):
         return "place"
-    if all(re.search(r"pretension|preload|slack|motor.*offset", name) for name in names):
-        return "preloads"
     if len(chosen) == 2:
         logarithmic, opposite = chosen[0].logarithmic, steps[0] * steps[1] < 0.0
         alike = chosen[1].logarithmic == logarithmic and (logarithmic or chosen[0].unit == chosen[1].unit)
