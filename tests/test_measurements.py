@@ -128,13 +128,13 @@ def test_scales_units_for_each_column_and_standard_deviations_from_columns() -> 
     table = {"a": [90.0, 0.0], "b": [5.0, 1.0], "f": [1.0, 2.0], "s": [0.1, 0.2], "count": [1, 0]}
     mapping = {
         "actuators": {"columns": ["a", "b"], "unit": ["deg", "mm"], "scale": [-1, 2]},
-        "motor_torques": {"columns": ["f", "b"], "unit": ["N mm", "kN"], "std": ["s", 0.5], "scale": [-1, 1]},
+        "motor_torques": {"columns": ["f", "b"], "unit": ["N mm", "kN"], "std": ["s", 0.5], "scale": [-1, 3]},
         "mask": "count",
     }
     found = sr.Measurements.from_table(table, mapping)
     np.testing.assert_allclose(found.q_motors, [[-math.pi / 2, 0.01], [0.0, 0.002]], rtol=1e-15)
-    np.testing.assert_allclose(found.measured["motor_torques"], [[-1e-3, 5e3], [-2e-3, 1e3]], rtol=1e-15)
-    np.testing.assert_allclose(found.std["motor_torques"], [[1e-4, 500.0], [2e-4, 500.0]], rtol=1e-15)
+    np.testing.assert_allclose(found.measured["motor_torques"], [[-1e-3, 15e3], [-2e-3, 3e3]], rtol=1e-15)
+    np.testing.assert_allclose(found.std["motor_torques"], [[1e-4, 1500.0], [2e-4, 1500.0]], rtol=1e-15)
     assert found.mask.tolist() == [True, False]
 
 
@@ -178,11 +178,13 @@ BAD_COLUMNS: list[tuple[str, Any, str]] = [
     ("positions.tip.columns", ["x", "y"], "names of 3 columns"),
     ("positions.tip.columns", ["x", "x", "y"], "each once"),
     ("positions.tip.columns", ["x", "y", 3], "names of 3 columns"),
-    ("positions.tip.std", [1.0, 2.0], "one or 3 of them"),
+    ("positions.tip.std", [1.0, 2.0], "a number or column, one or 3"),
     ("positions.tip.stdd", 1.0, "no entry of columns.positions.tip is called 'stdd' .did you mean 'std'"),
     ("positions", [1], "columns.positions.*a mapping"),
     ("postions", {}, "did you mean 'positions'"),
     ("mass.scale", 0.0, "different from zero"),
+    ("actuators", None, "entry 'actuators'"),
+    ("positions.tip.std", True, "a number or column"),
     ("mass.relative", True, "no entry of columns.mass"),
     ("actuators.relative", "yes", "true or false"),
     ("gravity", [0, 0], "columns.gravity"),

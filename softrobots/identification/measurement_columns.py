@@ -1,18 +1,4 @@
-"""Which columns of a table hold which measurements, in which units: a mapping, as a dictionary or a YAML or JSON file.
-
-    actuators: {columns: [servo_4_mm, servo_3_mm, servo_9_mm], unit: mm, relative: true}
-    gravity: [0, 0, -9.81]                                                # m/s^2; or columns and a unit
-    mass: {columns: hung_g, unit: g}
-    positions: {tip: {columns: [tip_x, tip_y, tip_z], unit: mm, std: 1.0}}
-    poses: {elbow: {columns: [x, y, z], unit: m, quaternion: [qw, qx, qy, qz], std: [0.001, 0.01]}}
-    motor_torques: {columns: [t_1, t_2, t_3], unit: [N m, N m, N], std: [std_1, std_2, std_3]}
-    labels: {column: pattern, without_suffix: _hold}
-
-`unit` is one for all columns, or one for each equal share of them; "SI" converts nothing. `scale` multiplies afterwards, e.g.
--1 for an axis that is mirrored, or the radius of a pulley. `std` has the unit of the columns: a number or the name of a column,
-one for all or one each; of poses two, position and angle. `force`, `wrench`, `tensions`, `frequencies`, `mask` and `markers`
-are those of `Measurements`.
-"""
+"""Which columns of a table hold which measurements, in which units."""
 
 from __future__ import annotations
 
@@ -76,9 +62,9 @@ class Group(NamedTuple):
     rotation: str
     """Form of the rotation of a pose, of `ROTATIONS`, or empty."""
     std: tuple[str | float, ...]
-    """Standard deviations, or the columns that hold them; empty if unknown."""
+    """Standard deviation of each component, or the columns that hold them; empty if unknown."""
     std_factors: FloatArray
-    """What converts those, shape (n_std,)."""
+    """What converts those."""
 
 
 class Layout(NamedTuple):
@@ -96,13 +82,8 @@ class Layout(NamedTuple):
     @property
     def gaps(self) -> set[str]:
         """Columns whose cells may be missing."""
-        return {
-            column
-            for group in self.groups
-            if QUANTITIES[group.quantity].measured
-            for column in (*group.columns, *group.std)
-            if isinstance(column, str)
-        }
+        measured = (group for group in self.groups if QUANTITIES[group.quantity].measured)
+        return {one for group in measured for one in (*group.columns, *group.std) if isinstance(one, str)}
 
     @property
     def numbers(self) -> tuple[str, ...]:
@@ -119,7 +100,7 @@ class Layout(NamedTuple):
             if group.rotation:
                 values = _poses(values[:, :3], values[:, 3:], group.rotation)
             if group.std:
-                rows = [numbers(one) if isinstance(one, str) else np.full(len(values), one) for one in group.std]
+                rows = [numbers(one) if isinstance(one, str) else np.full(len(values), float(one)) for one in group.std]
                 std[f"{group.quantity}.{group.name}".rstrip(".")] = np.column_stack(rows) * group.std_factors
             if group.name:
                 found.setdefault(group.quantity, {})[group.name] = values
@@ -138,7 +119,20 @@ class Layout(NamedTuple):
 
 
 def read_columns(columns: Any) -> Layout:
-    """Check a mapping of columns.
+    """Check a mapping of columns, as a dictionary or a YAML or JSON file.
+
+        actuators: {columns: [servo_4_mm, servo_3_mm, servo_9_mm], unit: mm, relative: true}
+        gravity: [0, 0, -9.81]                                            # m/s^2; or columns and a unit
+        mass: {columns: hung_g, unit: g}
+        positions: {tip: {columns: [tip_x, tip_y, tip_z], unit: mm, std: 1.0}}
+        poses: {elbow: {columns: [x, y, z], unit: m, quaternion: [qw, qx, qy, qz], std: [0.001, 0.01]}}
+        motor_torques: {columns: [t_1, t_2, t_3], unit: [N m, N m, N], std: [std_1, std_2, std_3]}
+        labels: {column: pattern, without_suffix: _hold}
+
+    `unit` is one for all columns, or one for each equal share of them; "SI" converts nothing. `scale` multiplies afterwards,
+    e.g. -1 for an axis that is mirrored, or the radius of a pulley. `std` has the unit of the columns: a number or the name of
+    a column, one for all or one each; of poses two, position and angle. The rotation of a pose is one of `ROTATIONS`, angles
+    in `angle_unit` (rad). `force`, `wrench`, `tensions`, `frequencies`, `mask` and `markers` are those of `Measurements`.
 
     Args:
         columns: The mapping, or the path of a YAML file (JSON if its name ends with `.json`) that holds it.
@@ -170,7 +164,7 @@ def _layout(columns: Any) -> Layout:
             groups += [_group(f"{where}.{name}", key, name, one) for name, one in _entry(where, value).items()]
         elif value is not None:
             groups.append(_group(where, key, "", value))
-    if "actuators" not in entry:
+    if entry.get("actuators") is None:
         raise ParameterError("columns", list(entry), "a mapping with the entry 'actuators'")
     relative = entry["actuators"].get("relative", False)
     constants["relative"] = instance_of("columns.actuators.relative", relative, bool, "true or false")
@@ -208,13 +202,14 @@ def _group(where: str, key: str, name: str, value: Any) -> Group:
         factors = np.append(factors, np.full(ROTATIONS[rotation], turn))
     given = entry.get("std", [])
     std = tuple(given) if isinstance(given, list | tuple) else (given,)
-    size = 6 if pose else len(columns)
-    if len(std) not in (0, size, 2 if pose else 1) or not all(isinstance(one, str | int | float) for one in std):
-        raise ParameterError(
-            f"{where}.std", given, f"a number or the name of a column, {'two' if pose else 'one'} or {size} of them"
+    size, few = (6, 2) if pose else (len(columns), 1)
+    if len(std) not in (0, few, size) or any(isinstance(one, bool) or not isinstance(one, str | int | float) for one in std):
+        requirement = (
+            f"a number or the name of a column, {few} or {size} of them" if pose else f"a number or column, one or {size}"
         )
-    each = np.repeat([units[0], angle], max(len(std) // 2, 1)) if pose else units[: len(std)] if len(std) > 1 else units[:1]
-    std = tuple(one if isinstance(one, str) else float(one) for one in std)
+        raise ParameterError(f"{where}.std", given, requirement)
+    std = tuple(one for one in std for _ in range(size // len(std)))
+    each = np.append(factors[:3], np.full(3, angle)) if pose else factors
     return Group(key, name, columns, factors, rotation, std, np.abs(each))
 
 
