@@ -14,7 +14,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.identification.suspicions import doubtful_sizes, suspicions
+from softrobots.identification.suspicions import doubtful_sizes, hints, suspicions
+from softrobots.statics.kinematics import frame_placement
 from tests.conftest import CHECKOUT
 from tests.support.tables import each_row
 
@@ -113,6 +114,18 @@ def test_sizes_are_doubted_before_a_fit(tips: Any) -> None:
     assert re.search(r"motor_1 goes from -2\d\.\d+ to 2\d\.\d+ rad", said)
     assert "gravity is 9810 m/s^2, on the ground 9.81" in said
     assert "spreads over 0.000976 m" in doubtful_sizes(sr.Measurements(MOTORS, tip_position=1e-3 * tips), arm)[0]
+
+
+def test_a_frame_that_is_not_the_one_measured_is_told() -> None:
+    """The ball sat at the hinge of the second link, and was told to be at the tip."""
+    arm = sr.load_model(sr.InflatableArm())
+    held = [sr.solve_equilibrium(arm, q, gravity=(0, 0, -9.81)) for q in MOTORS[:12]]
+    seen = np.array([frame_placement(arm, one.q, "link_2").translation for one in held])
+    wrong = sr.Measurements(MOTORS[:12], tip_position=seen, gravity=(0, 0, -9.81))
+    found = hints(sr.identify(arm, wrong, "base.position"))
+    assert [text for text in found if re.match("positions.tip: taking it for the frame (hinge_2|link_2) leaves .* % of", text)]
+    right = sr.Measurements(MOTORS[:12], positions={"link_2": seen}, gravity=(0, 0, -9.81))
+    assert hints(sr.identify(arm, right, "base.position")) == []
 
 
 def test_the_recordings_are_not_doubted() -> None:

@@ -18,6 +18,7 @@ from softrobots.cli import (
     doctor,
     export,
     helix,
+    identify,
     ik,
     load,
     modes,
@@ -31,12 +32,17 @@ from softrobots.cli.options.command_line import exit_status, take_negative_numbe
 from softrobots.core.errors import ParameterError
 from softrobots.version import __version__
 
-COMMANDS = (urdf, export, solve, branches, load, ik, simulate, modes, characterise, pcc, helix, view, bench, doctor, completion)
+COMMANDS = (
+    *(urdf, export, solve, branches, load, ik, simulate, modes, characterise, identify, pcc, helix, view, bench, doctor),
+    completion,
+)
 """Modules of the subcommands, in the order of the help."""
 
 
 _ALIASES = {
     "model": "robot",
+    "priors": "prior",
+    "validation": "hold_out",
     "springs": "spring",
     "q_motors": "motors",
     "q_motors0": "start",

@@ -1,4 +1,4 @@
-"""What a bad fit smells of: wrong units, swapped or mirrored axes, shifted rows, commands of wrong sign or order.
+"""What a bad fit smells of: wrong units or frames, swapped or mirrored axes, shifted rows, commands of wrong sign or order.
 
 Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them.
 """
@@ -10,9 +10,13 @@ from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.identification.identification import Identification
 from softrobots.identification.measurements import Measurements
+from softrobots.identification.parameters import ParameterSet
+from softrobots.identification.prediction import Predictor
 from softrobots.model.soft_model import SoftModel, check_model
 
 FACTORS = (
@@ -32,8 +36,21 @@ FAR_LESS = 0.25
 """What a remedy must leave of it to be told: residuals of at most half the size."""
 
 _FEWEST = 4  # rows
+_MOST_SOLVED = 50  # rows in which other frames are tried
 _SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; other parameters are not right yet either
 _EARTH = (9.76, 9.84)  # gravity on the ground [m/s^2]
+
+
+def hints(found: Identification) -> list[str]:
+    """Return what may be wrong with the measurements of a fit, in plain sentences; see `suspicions`. Empty if nothing is."""
+    rows, texts = found.fitted.measurements, []
+    few = slice(None, None, -(-len(rows) // _MOST_SOLVED))
+    for key, values in found.fitted.predicted.items():
+        measured, predicted = _points(rows.measured[key]), _points(values)
+        texts += suspicions(measured, predicted, rows.q_motors, name=key)
+        if key.startswith(("positions.", "poses.")) and _unexplained(measured, predicted) > UNEXPLAINED:
+            texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
+    return texts
 
 
 def suspicions(
@@ -64,8 +81,7 @@ def suspicions(
 
     def tell(after: float, text: str, start: float = before) -> bool:
         if after < FAR_LESS * start:
-            shares = f"{100.0 * after:.2g} % of the variance unexplained instead of {100.0 * start:.2g} %"
-            found.append(f"{name}: {text} leaves {shares}")
+            found.append(f"{name}: {text} {_words(after, start)}")
         return after < FAR_LESS * start
 
     names = tuple(components) if len(components) == m.shape[1] else tuple(map(str, range(1, m.shape[1] + 1)))
@@ -116,6 +132,33 @@ def doubtful_sizes(measurements: Measurements, model: SoftModel) -> list[str]:
         if size and not _EARTH[0] < size < _EARTH[1]:
             found.append(f"gravity is {size:.4g} m/s^2, on the ground 9.81: is the unit right?")
     return found
+
+
+def _other_frame(found: Identification, key: str, rows: Measurements, before: float) -> list[str]:
+    """The frame whose predicted positions explain far more, if there is one."""
+    own = rows.markers.get(key.partition(".")[2], key.partition(".")[2])
+    prediction = Predictor(ParameterSet.of(found.model, found.names, rows.markers), rows).at(found.solution)
+    links = [frame.name for frame in found.model.pinocchio.frames if frame.type == pin.FrameType.BODY and frame.name != own]
+    shares = {link: _unexplained(_points(rows.measured[key]), prediction.frame(link)[0]) for link in links}
+    best = min(shares, key=shares.__getitem__)
+    if shares[best] >= FAR_LESS * before:
+        return []
+    return [f"{key}: taking it for the frame {best} {_words(shares[best], before)}"]
+
+
+def _points(values: FloatArray) -> FloatArray:
+    """Positions of poses; other numbers as they are."""
+    return values[:, :3, 3] if values.ndim == 3 else values
+
+
+def _unexplained(measured: FloatArray, predicted: FloatArray) -> float:
+    """Unexplained share of the variance, of rows that are complete."""
+    known = np.isfinite(measured).all(axis=1) & np.isfinite(predicted).all(axis=1)
+    return _share(_centred(measured[known]), _centred(predicted[known])) if known.any() else 0.0
+
+
+def _words(after: float, before: float) -> str:
+    return f"leaves {100.0 * after:.2g} % of the variance unexplained instead of {100.0 * before:.2g} %"
 
 
 def _centred(values: FloatArray) -> FloatArray:

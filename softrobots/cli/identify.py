@@ -1,0 +1,160 @@
+"""`softrobots identify`: parameters of a robot from measurements."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import re
+import warnings
+from pathlib import Path
+from typing import Any
+
+from softrobots.cli.options.robot_argument import add_model, statics_model_of
+from softrobots.cli.options.robot_parameters import name_of, write_robot
+from softrobots.cli.reports.answers import add_json, plain, print_answer
+from softrobots.cli.reports.identification_report import identification_answer, identification_lines, prediction_table
+from softrobots.core.checks import positive_integer
+from softrobots.core.errors import ParameterError
+from softrobots.core.files import csv_text, new_file, write_text
+from softrobots.core.result_file import save_result
+from softrobots.identification.cross_validation import CrossValidation, cross_validate
+from softrobots.identification.fit import INTERRUPTED
+from softrobots.identification.identification import Identification
+from softrobots.identification.identify import LOSSES, identify
+from softrobots.identification.measurements import Measurements
+from softrobots.identification.suspicions import doubtful_sizes
+from softrobots.model.soft_model import SoftModel
+
+_EXAMPLES = """examples:
+  softrobots identify poses.csv --robot inflatable_arm --columns columns.yaml --fit stiffness,hinge_offset -o fit/
+  softrobots identify train.csv --robot tendon_arm --columns columns.yaml --fit base.position,base.rotation,young_modulus \
+--validate val.csv --loss soft_l1 -o fit/
+  softrobots identify poses.csv --robot arm.urdf --fit joint[elbow].stiffness --prior joint[elbow].stiffness=40,10 \
+--hold-out 'day2_*'
+  softrobots identify poses.csv --robot pcc_arm --fit young_modulus --fit segment[*].young_modulus --families 'day[0-9]'
+"""
+
+_FILES = ("report.txt", "identification.json", "identification.npz", "predictions.csv", "robot.yaml")
+
+
+def add_parser(subparsers: Any) -> None:
+    """Add the subcommand."""
+    parser = subparsers.add_parser(
+        "identify",
+        help="fit parameters of a robot to measurements",
+        description="Fit parameters of a robot to measured positions, poses, torques, tensions or frequencies at rest, by "
+        "least squares with exact derivatives. Exit status 0 if the fit converges, 1 if not, 2 after bad input, 130 after "
+        "Ctrl-C, which writes what there is.",
+        epilog=_EXAMPLES,
+    )
+    parser.add_argument("data", type=Path, metavar="DATA.csv", help="measured rows; the first line names the columns")
+    add_model(parser, option=True)
+    help_text = (
+        "which columns are what, in which units: a YAML or JSON file, e.g. with lines `actuators: {columns: [q1, q2], "
+        "unit: deg}`, `positions: {tip: {columns: [x, y, z], unit: mm}}`, `mass: {columns: hung, unit: g}`, "
+        "`gravity: [0, 0, -9.81]` and `labels: set` (told by DATA.csv itself)"
+    )
+    parser.add_argument("--columns", type=Path, metavar="FILE", help=help_text)
+    help_text = (
+        "names of the parameters to fit, with commas between: fields of the robot, link[2].stiffness, link[*].stiffness, "
+        "joint[NAME].stiffness, base.position, base.rotation, marker.NAME.offset, motor[*].offset; given several times, the "
+        "set with the least error on families of rows that are left out in turn is taken (required)"
+    )
+    parser.add_argument("--fit", action="append", required=True, metavar="NAME,NAME", help=help_text)
+    help_text = "what is known of a parameter: mean and standard deviation, in its unit; once for each (nothing)"
+    parser.add_argument("--prior", action="append", type=prior, default=[], metavar="NAME=MEAN,STD", help=help_text)
+    help_text = "loss of a residual; outliers count less in all but the first (%(default)s)"
+    parser.add_argument("--loss", choices=LOSSES, default=LOSSES[0], help=help_text)
+    help_text = "number of starts: the present values, then random ones around them (%(default)s)"
+    parser.add_argument("--starts", type=int, default=1, metavar="N", help=help_text)
+    aside = parser.add_mutually_exclusive_group()
+    help_text = "other rows, with the same columns, that are predicted and not fitted (none)"
+    aside.add_argument("--validate", type=Path, metavar="OTHER.csv", help=help_text)
+    help_text = "labels of rows, or patterns of them, that are predicted and not fitted (none)"
+    aside.add_argument("--hold-out", nargs="+", metavar="LABEL", help=help_text)
+    help_text = (
+        "family of a label: what this regular expression finds in it, or its group; families are left out in turn to tell the "
+        "error on what was not seen (each label is one)"
+    )
+    parser.add_argument("--families", metavar="REGEX", help=help_text)
+    help_text = f"folder for {', '.join(_FILES)}; robot.yaml is a robot for every other command (not saved)"
+    parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=help_text)
+    parser.add_argument("--overwrite", action="store_true", help="allow files to be replaced")
+    add_json(parser)
+    parser.set_defaults(run=run)
+
+
+def run(arguments: argparse.Namespace) -> bool:
+    """Read, fit, write the files and print the answer; return False if the fit did not converge."""
+    positive_integer("--starts", arguments.starts)
+    priors = dict(arguments.prior)
+    if len(priors) < len(arguments.prior):
+        raise ParameterError("--prior", [name for name, _ in arguments.prior], "given once for each parameter")
+    if arguments.output is not None:
+        for name in _FILES:
+            new_file(arguments.output / name, overwrite=arguments.overwrite)
+    model = statics_model_of(arguments)
+    rows = Measurements.from_csv(arguments.data, arguments.columns)
+    rows.check(model)
+    for doubt in doubtful_sizes(rows, model):
+        warnings.warn(doubt, stacklevel=1)
+    sets = {text: re.split(r",(?![^\[]*\])", text.replace(" ", "")) for text in arguments.fit}
+    options = {"loss": arguments.loss, "priors": priors, "starts": arguments.starts}
+    aside: Any = arguments.hold_out
+    if arguments.validate is not None:
+        aside = Measurements.from_csv(arguments.validate, arguments.columns)
+    try:
+        compared = _compare(arguments, model, rows, sets, options)
+        chosen = arguments.fit[0] if compared is None else compared.best
+        found = identify(model, rows, sets[chosen], validation=aside, progress=True, **options)
+    except ParameterError as error:
+        if error.field != "parameters":
+            raise
+        raise ParameterError("--fit", error.value, error.requirement) from error
+    answer, lines = identification_answer(found, compared), identification_lines(found, compared)
+    files = [] if arguments.output is None else _write(arguments, found, answer, lines)
+    if found.robot is not None and any(file.name == "robot.yaml" for file in files):
+        lines += ["", f"as a robot: softrobots solve {arguments.output / 'robot.yaml'}"]
+        others = [one.name for one in found.parameters if one.place.kind != "field"]
+        lines += [f"not parameters of the robot, so not in robot.yaml: {', '.join(others)}"] if others else []
+    print_answer(arguments, answer, lines, files)
+    if found.message == INTERRUPTED:
+        raise KeyboardInterrupt
+    return found.message == "converged"
+
+
+def prior(word: str) -> tuple[str, tuple[float, float]]:
+    """Parse NAME=MEAN,STD."""
+    name, _, numbers = word.rpartition("=")
+    try:
+        mean, std = map(float, numbers.split(","))
+    except ValueError:
+        name = ""
+    if not name:
+        raise argparse.ArgumentTypeError(f"{word!r}: NAME=MEAN,STD is required")
+    return name, (mean, std)
+
+
+def _compare(
+    arguments: argparse.Namespace, model: SoftModel, rows: Measurements, sets: dict[str, list[str]], options: dict[str, Any]
+) -> CrossValidation | None:
+    """The errors of sets of parameters on families that are left out, if that is asked for."""
+    if len(sets) == 1 and arguments.families is None:
+        return None
+    seen = rows if arguments.hold_out is None else rows.without_labels(*arguments.hold_out)
+    return cross_validate(model, seen, sets, arguments.families, progress=True, **options)
+
+
+def _write(arguments: argparse.Namespace, found: Identification, answer: dict[str, Any], lines: list[str]) -> list[Path]:
+    """Write the files of a fit."""
+    folder, overwrite = arguments.output, arguments.overwrite
+    files = [
+        write_text(folder / "report.txt", "\n".join(lines) + "\n", overwrite=overwrite),
+        write_text(folder / "identification.json", json.dumps(plain(answer), indent=2) + "\n", overwrite=overwrite),
+        save_result(found, folder / "identification.npz", overwrite=overwrite),
+        write_text(folder / "predictions.csv", csv_text(*prediction_table(found)), overwrite=overwrite),
+    ]
+    name = None if found.robot is None else name_of(found.robot)
+    if name is not None:
+        files.append(write_robot(folder / "robot.yaml", name, found.robot, overwrite=overwrite))
+    return files

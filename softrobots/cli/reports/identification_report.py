@@ -1,0 +1,107 @@
+"""Fits of parameters as answers of a command: for a person, for a machine, and measured beside predicted numbers."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.identification.cross_validation import CrossValidation
+from softrobots.identification.identification import UNITS, Comparison, Identification
+from softrobots.identification.suspicions import hints
+
+
+def identification_answer(found: Identification, compared: CrossValidation | None) -> dict[str, Any]:
+    """A fit by names of the library, and the comparison of sets of parameters, if there is one."""
+    blocks = found.block_intervals
+    rows = found.fitted.measurements
+    return {
+        "message": found.message,
+        "steps": len(found.history.cost),
+        "loss": found.loss,
+        "parameters": {
+            one.name: {
+                "unit": one.unit,
+                "start": one.value,
+                "value": found.values[one.name],
+                "interval": found.intervals[one.name],
+                "block_interval": blocks.get(one.name),
+                "prior": found.priors.get(one.name),
+            }
+            for one in found.parameters
+        },
+        "covariance": found.covariance,
+        "block_covariance": found.block_covariance,
+        "fitted": _errors(found.fitted),
+        "validation": None if found.validation is None else _errors(found.validation),
+        "outliers": [rows.where(row) for row in found.outliers],
+        "unidentifiable": found.unidentifiable,
+        "held": found.held,
+        "hints": hints(found),
+        "springs": _springs(found),
+        "cross_validation": None if compared is None else _compared(compared),
+    }
+
+
+def identification_lines(found: Identification, compared: CrossValidation | None) -> list[str]:
+    """The same for a person."""
+    lines = found.summary().splitlines()
+    lines += [f"hint: {text}" for text in hints(found)]
+    if found.robot is None:
+        words = (f"--spring {joint}={stiffness:.6g},{rest:.6g}" for joint, (stiffness, rest) in _springs(found).items())
+        lines += ["", f"its springs, as options of other commands: {' '.join(words)}"]
+    return [*lines, "", *compared.summary().splitlines()] if compared is not None else lines
+
+
+def prediction_table(found: Identification) -> tuple[list[str], Iterator[list[Any]]]:
+    """Names of columns, and rows, of measured, predicted and remaining numbers in SI units; of rotations only what remains."""
+    parts = [("fitted", found.fitted), *([("validation", found.validation)] if found.validation is not None else [])]
+    names = ["set", "row", "label"]
+    for key, left in found.fitted.residuals.items():
+        kind, axes = key.partition(".")[0], _axes(key, left)
+        shown = axes[:3] if kind == "poses" else axes
+        unit = UNITS.get(kind, "m")
+        names += [f"{what} {key} {axis} [{unit}]" for what in ("measured", "predicted") for axis in shown]
+        names += [f"residual {key} {axis} [{'rad' if axis.startswith('r') else unit}]" for axis in axes]
+
+    def rows() -> Iterator[list[Any]]:
+        for name, one in parts:
+            numbers = [_flat(values) for key in one.residuals for values in _numbers(one, key)]
+            for row, cells in enumerate(np.hstack(numbers).tolist()):
+                label = one.measurements.labels[row] if one.measurements.labels is not None else ""
+                yield [name, one.measurements.where(row), label, *("" if cell != cell else cell for cell in cells)]
+
+    return names, rows()
+
+
+def _numbers(one: Comparison, key: str) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Measured and predicted numbers, and what remains."""
+    return one.measurements.measured[key], one.predicted[key], one.residuals[key]
+
+
+def _flat(values: FloatArray) -> FloatArray:
+    return values[:, :3, 3] if values.ndim == 3 else values
+
+
+def _axes(key: str, values: FloatArray) -> list[str]:
+    """What the columns of residuals are called."""
+    if key.startswith(("positions.", "poses.")):
+        return ["x", "y", "z", "rx", "ry", "rz"][: values.shape[1]]
+    return [str(place + 1) for place in range(values.shape[1])]
+
+
+def _errors(one: Comparison) -> dict[str, Any]:
+    errors = {key: {"root_mean_square": error, "unit": unit} for key, (error, unit) in one.errors.items()}
+    return {"rows": len(one.measurements), "errors": errors}
+
+
+def _springs(found: Identification) -> dict[str, tuple[float, float]]:
+    """Stiffness and rest of the joint springs of a robot that is no dataclass."""
+    return {} if found.robot is not None else dict(found.model.spring_table)
+
+
+def _compared(one: CrossValidation) -> dict[str, Any]:
+    names = ("sets", "families", "errors", "unit", "means", "standard_errors", "least", "best")
+    return {name: getattr(one, name) for name in names}

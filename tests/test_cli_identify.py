@@ -1,0 +1,148 @@
+"""The command `softrobots identify`: from a CSV file to a folder with report, numbers, table and a robot for other commands."""
+
+from __future__ import annotations
+
+import csv
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.robots.parameter_file import read_robot
+from tests.support.tables import each_row
+
+Told = Callable[..., tuple[int, str, str]]
+STIFFNESS = 150.0
+COLUMNS = """actuators: {columns: [m1, m2, m3], unit: deg}
+mass: {columns: hung, unit: g}
+gravity: [0, 0, -9.81]
+positions: {tip: {columns: [x, y, z], unit: mm, std: 0.001}}
+labels: day
+"""
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    """Twelve rows on three days, of an arm with another stiffness and its base 0.1 m away, to a hundredth of a micrometre."""
+    arm = sr.load_model(sr.InflatableArm(stiffness=STIFFNESS))
+    rows = ["m1,m2,m3,hung,x,y,z,day"]
+    for k, motors in enumerate(np.random.default_rng(1).uniform(-30.0, 30.0, (12, 3)).round(2)):
+        mass = 500 * (k % 3)
+        tip = sr.solve_equilibrium(arm, np.radians(motors), (0, 0, -9.81e-3 * mass), gravity=(0, 0, -9.81)).tip_position
+        rows.append(",".join(map(str, (*motors, mass, *(1e3 * tip + (100, 0, 0)).round(5), f"day{k // 4 + 1}"))))
+    (tmp_path / "poses.csv").write_text("\n".join(rows) + "\n", encoding="utf-8")
+    (tmp_path / "columns.yaml").write_text(COLUMNS, encoding="utf-8")
+    monkeypatch.chdir(tmp_path)
+    return tmp_path
+
+
+WORDS = ("identify", "poses.csv", "--robot", "inflatable_arm", "--columns", "columns.yaml")
+FIT = ("--fit", "stiffness, base.position")
+
+
+def test_a_folder_holds_the_fit_and_a_robot_for_other_commands(folder: Path, told: Told) -> None:
+    status, out, err = told(*WORDS, *FIT, "--hold-out", "day3", "-o", "fit", "--json")
+    assert status == 0, err
+    answer = json.loads(out)
+    found = answer["parameters"]
+    # rows are rounded to 1e-8 m: of 0.1 m sag that is 1e-7 of the stiffness
+    assert found["stiffness"]["value"] == pytest.approx(STIFFNESS, rel=1e-6)
+    assert found["base.position.x"]["value"] == pytest.approx(0.1, abs=1e-7)
+    assert [found[name]["unit"] for name in ("stiffness", "base.position.x")] == ["N m/rad", "m"]
+    low, high = found["stiffness"]["interval"]
+    assert low < STIFFNESS < high
+    assert (answer["message"], answer["fitted"]["rows"], answer["validation"]["rows"]) == ("converged", 8, 4)
+    assert answer["validation"]["errors"]["positions.tip"]["root_mean_square"] < 1e-7
+    assert np.shape(answer["covariance"]) == (4, 4)
+    names = ["report.txt", "identification.json", "identification.npz", "predictions.csv", "robot.yaml"]
+    assert [Path(file).name for file in answer["files"]] == names
+    assert json.loads((folder / "fit" / "identification.json").read_text(encoding="utf-8")) == {
+        key: value for key, value in answer.items() if key != "files"
+    }
+    report = (folder / "fit" / "report.txt").read_text(encoding="utf-8")
+    assert "base.position.x" in report
+    assert "hint" not in report
+
+    robot = read_robot(folder / "fit" / "robot.yaml")
+    assert robot.stiffness == (found["stiffness"]["value"],) * 2  # type: ignore[attr-defined]
+    loaded = sr.load_result(folder / "fit" / "identification.npz")
+    assert loaded.values["stiffness"] == found["stiffness"]["value"]
+    motors = ("--motors", "0.3", "0.6", "-0.8", "--gravity", "--json")
+    status, out, err = told("solve", "fit/robot.yaml", *motors)
+    assert status == 0, err
+    same = sr.solve_equilibrium(sr.load_model(robot), (0.3, 0.6, -0.8), gravity=(0, 0, -9.81))
+    np.testing.assert_allclose(json.loads(out)["tip_position"], same.tip_position, rtol=1e-12)
+    assert told("solve", "inflatable_arm", "--parameters", "fit/robot.yaml", *motors)[1] == out
+
+    with (folder / "fit" / "predictions.csv").open(encoding="utf-8", newline="") as stream:
+        rows = list(csv.DictReader(stream))
+    assert [row["set"] for row in rows] == ["fitted"] * 8 + ["validation"] * 4
+    assert [row["row"] for row in rows] == [f"line {line}" for line in range(2, 14)]
+    for row in rows:
+        x, predicted, left = (float(row[f"{what} positions.tip x [m]"]) for what in ("measured", "predicted", "residual"))
+        assert x - predicted == pytest.approx(left, abs=1e-15)
+
+    status, out, err = told(*WORDS, *FIT, "-o", "fit")
+    assert (status, out) == (2, "")
+    assert "report.txt exists" in err
+    status, out, err = told(*WORDS, *FIT, "-o", "fit", "--overwrite")
+    assert status == 0, err
+    assert "not in robot.yaml: base.position.x, base.position.y, base.position.z\n" in out
+
+
+def test_sets_of_parameters_are_compared_on_families_left_out(folder: Path, told: Told) -> None:
+    status, out, err = told(*WORDS, *FIT, "--fit", "stiffness", "--families", "day[0-9]", "--json")
+    assert status == 0, err
+    compared = json.loads(out)["cross_validation"]
+    assert compared["families"] == ["day1", "day2", "day3"]
+    assert compared["best"] == "stiffness, base.position"
+    assert compared["means"][0] < 1e-7 < 1e-3 < compared["means"][1]  # the base is 0.1 m away
+
+
+@pytest.mark.filterwarnings("default:positions.tip spreads")
+def test_a_unit_that_is_wrong_is_told_before_and_after_the_fit(folder: Path, told: Told) -> None:
+    (folder / "columns.yaml").write_text(COLUMNS.replace("unit: mm", "unit: m"), encoding="utf-8")
+    _, out, err = told(*WORDS, "--fit", "base.position")
+    assert "warning: positions.tip spreads over" in err
+    assert "hint: positions.tip: dividing it by 1000 (mm (N mm, g) taken for m (N m, kg)" in out
+
+
+def test_springs_of_a_foreign_file_are_options_of_other_commands(folder: Path, told: Told) -> None:
+    Path("arm.urdf").write_text(sr.InflatableArm().urdf(), encoding="utf-8")
+    words = ("identify", "poses.csv", "--robot", "arm.urdf", "--columns", "columns.yaml")
+    fitted = ("base.position", "joint[spring_1_up].stiffness", "joint[spring_2_up].stiffness")
+    status, out, err = told(*words, "--fit", ",".join(fitted), "-o", "fit")
+    assert status == 0, err
+    assert "--spring spring_1_side=172.71,0 --spring spring_1_up=150,0" in out
+    assert not Path("fit/robot.yaml").exists()
+
+
+BAD: list[tuple[tuple[Any, ...], str]] = [
+    ((*FIT, "--loss", "square"), "invalid choice: 'square'"),
+    ((*FIT, "--starts", "0"), "--starts = 0"),
+    ((*FIT, "--prior", "stiffness=1"), "NAME=MEAN,STD is required"),
+    ((*FIT, "--prior", "stiffness=1,-1"), "--prior"),
+    ((*FIT, "--prior", "stiffness=1,1", "--prior", "stiffness=1,2"), "given once for each parameter"),
+    ((*FIT, "--prior", "radius=1,1"), "no fitted parameter is called 'radius'"),
+    (("--fit", "stifness"), "did you mean 'stiffness'"),
+    (("--fit", "stiffness,link[1].stiffness"), "--fit = "),
+    ((*FIT, "--hold-out", "day9"), "no label is called 'day9'"),
+    ((*FIT, "--hold-out", "day*"), "--hold-out"),
+    ((*FIT, "--validate", "nothing.csv"), "cannot read nothing.csv"),
+    ((*FIT, "--columns", "nothing.yaml"), "nothing.yaml"),
+    ((*FIT, "--robot", "columns.yaml"), "actuators"),
+    ((*FIT, "--robot", "nothing.yaml"), "no robot or file is called 'nothing.yaml'"),
+    ((*FIT, "--robot", "pcc_arm"), "of 6 columns"),
+    ((*FIT, "--families", "("), "--families"),
+]
+
+
+@each_row(("words", "message"), BAD)
+def test_bad_input_is_refused_with_status_2(words: tuple[str, ...], message: str, folder: Path, told: Told) -> None:
+    status, out, err = told(*WORDS, *words)
+    assert (status, out) == (2, "")
+    assert message in err
