@@ -191,7 +191,7 @@ def test_constant_curvature_without_forces_is_three_arcs(rng: np.random.Generato
 
 
 def test_the_files_stand_beside_their_source_and_licence() -> None:
-    files = {"LICENSE", "README.md", "columns.yaml", "tendon_pull.csv", "train.csv", "val.csv"}
+    files = {"LICENSE", "README.md", "columns.yaml", "robot.yaml", "tendon_pull.csv", "train.csv", "val.csv"}
     assert {path.name for path in FOLDER.iterdir()} == files
     assert "Copyright (c) 2026 Continuum Robotics Lab" in (FOLDER / "LICENSE").read_text(encoding="utf-8")
     assert "github.com/ContinuumRoboticsLab/opencr-mujoco" in (FOLDER / "README.md").read_text(encoding="utf-8")

@@ -23,6 +23,7 @@ INTERRUPTED = "interrupted: the best values up to then"
 _ROUNDS = 6  # most searches, each with derivatives of the model's numbers of where the last one ended
 _NEAR = 0.01  # change of the parameters, relative, up to which those derivatives are good enough on the way
 _SAME = 1e-8  # share of the cost that a further step may gain at the end: 0.005 standard errors with 1000 rows
+_SAME_RUBBING = 1e-5  # the same of a robot with dry friction: where rows begin to slip, the cost has kinks
 _ROUNDING = 1e-22  # share of the first cost that is rounding
 _LEAST = 1e-9  # of an unknown standard deviation, relative to the differences at the start
 
@@ -121,6 +122,7 @@ class Fit:
         """Take predictions, weights, prior, loss, and an iterator that is advanced at every step."""
         self.predictor, self.weights, self.prior, self.loss, self._steps = predictor, weights, prior, loss, steps
         self._logarithmic = predictor.parameters.logarithmic
+        self._same = _SAME if predictor.parameters.present.structure.friction is None else _SAME_RUBBING
         self._held = np.zeros((0, len(self._logarithmic)))
         self._count = self._linear = 0
         self._known: tuple[Any, FloatArray, FloatArray] | None = None
@@ -159,8 +161,8 @@ class Fit:
             for _ in range(_ROUNDS if most else 0):
                 left = max(1, most - len(self.course))
                 found = least_squares(
-                    self._rows, x, self._jacobian, bounds, x_scale="jac", loss=self._loss, ftol=_SAME, xtol=1e-9, gtol=1e-12,
-                    max_nfev=left,
+                    self._rows, x, self._jacobian, bounds, x_scale="jac", loss=self._loss, ftol=self._same, xtol=1e-9,
+                    gtol=1e-12, max_nfev=left,
                 )  # fmt: skip
                 x, self.message = found.x, "converged" if found.status > 0 else f"not converged in {most} steps"
                 if self._exact_at is not x:
@@ -250,7 +252,9 @@ class Fit:
         size = np.sqrt(self._loss(rows**2)[1])
         left = np.linalg.qr(slopes * size[:, None])[0]
         gain, cost = float(np.sum((left.T @ (rows * size)) ** 2)), float(np.sum((rows * size) ** 2))
-        return gain <= _SAME * cost or cost <= _ROUNDING * self.course[0][0]
+        if self._same == _SAME_RUBBING and cost > 1e-6 * self.course[0][0]:
+            return True  # kinks leave such steps a gain that they do not have
+        return gain <= self._same * cost or cost <= _ROUNDING * self.course[0][0]
 
     def _loss(self, z: FloatArray) -> FloatArray:
         """The loss of what was measured; priors and held combinations are squared."""

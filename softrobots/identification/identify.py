@@ -31,6 +31,7 @@ LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 
 _PERFECT = 1e-18  # share of the squares at the start at which a fit leaves nothing but rounding
 _FEW = 50  # rows, spread evenly, with which a search begins where there are more than twice as many
+_FLAT = 1e-6  # spread across the line along which positions lie, relative, below which no turn about it shows
 _SPREAD = 0.3  # of random starts, relative; for angles and rotations in rad, for lengths relative to the reach
 
 
@@ -94,6 +95,7 @@ def identify(
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
     with one_blas_thread(1000):
         predictor = Predictor(chosen, rows)
+        values[0] = _mounted(predictor, values[0], counted)
         weights = Weights.of(rows.std, predictor.at(values[0]).differences(), counted)
         robust = loss if weights.known else "linear"
         if every > 1 and not in_order:
@@ -134,6 +136,43 @@ def _best(
             best.message = INTERRUPTED
             break
     return best  # type: ignore[return-value]
+
+
+def _mounted(predictor: Predictor, values: FloatArray, counted: Any) -> FloatArray:
+    """Return values, shape (P,), with the pose of the base that brings predicted positions nearest to the measured ones.
+
+    By the singular value decomposition of their covariance: W. Kabsch, Acta Crystallographica A32:922-923, 1976. A fit that
+    starts with the base turned the wrong way ends beside the best one. The values stay as they are where position and rotation
+    of the base are not both fitted from zero, or fewer than three positions, or positions along a line, were measured.
+
+    Args:
+        predictor: Predictions of the rows.
+        values: Values to start from, shape (P,).
+        counted: Rows that count, shape (n,), truth values.
+    """
+    from scipy.spatial.transform import Rotation
+
+    pose = {one.name: number for number, one in predictor.parameters.places("base")}
+    places = [pose.get(f"base.{what}.{axis}", -1) for what in ("position", "rotation") for axis in "xyz"]
+    if min(places) < 0 or np.any(values[places]):
+        return values
+    prediction, seen, measured = predictor.at(values), [], []
+    for key, positions in predictor.measurements.measured.items():
+        if key.startswith("positions."):
+            there = np.isfinite(positions).all(axis=1) & counted
+            measured.append(positions[there])
+            seen.append(prediction.seen[key].values[there])
+    if sum(map(len, measured)) < 3:
+        return values
+    from_base, told = np.concatenate(seen), np.concatenate(measured)
+    middle, centre = from_base.mean(axis=0), told.mean(axis=0)
+    spread = np.linalg.svd((from_base - middle).T @ (told - centre), compute_uv=False)
+    if spread[1] <= _FLAT * spread[0]:
+        return values
+    turn, _ = Rotation.align_vectors(told - centre, from_base - middle)
+    start = values.copy()
+    start[places] = *(centre - turn.apply(middle)), *turn.as_rotvec()
+    return start
 
 
 def _starts(chosen: ParameterSet, seed: int, count: int) -> list[FloatArray]:

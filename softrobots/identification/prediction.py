@@ -4,13 +4,15 @@ The base stands at `t`, turned by `R`, in the frame of the measurements: what is
 a load or gravity `f` told there is `R^T f` to the robot. A marker at `o` in its frame is at `x + R_f o`. Actuators are at what
 was commanded plus an offset. Each search for an equilibrium starts from that of the values before.
 
-A robot with dry friction remembers: each row comes from the row before, the first from rest, and derivatives, which go through
-all that it remembers, are differences of the whole course. Those of all other robots are in closed form.
+A robot with dry friction remembers: each row comes from the row before, the first from rest, and derivatives go through all
+that it remembers. They are in closed form, too (`softrobots.identification.friction_derivatives`), but with friction of guides
+or given lengths, where they are differences of the whole course.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
@@ -18,13 +20,14 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
+from softrobots.identification.friction_derivatives import friction_loads, slopes_of_course
 from softrobots.identification.loaded_tree import cross
 from softrobots.identification.measured_robot import frame_of, wrenches_on
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
-from softrobots.model.friction_coordinates import after_step, untouched
+from softrobots.model.friction_coordinates import after_step, memory_of, untouched
 from softrobots.model.numbers import LAW
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState
@@ -32,7 +35,6 @@ from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.loads import Load
 
 _TOLERANCE = 1e-12  # of residuals, relative to the load: derivatives are taken there
-_STEP = 1e-6  # of differences of a course, relative
 
 
 class Seen(NamedTuple):
@@ -49,8 +51,11 @@ class Seen(NamedTuple):
 class Prediction:
     """All rows at one set of values."""
 
-    def __init__(self, predictor: Predictor, values: FloatArray, model: SoftModel, states: States) -> None:
-        """Take the equilibria of the rows."""
+    def __init__(
+        self, predictor: Predictor, values: FloatArray, model: SoftModel, states: States, sliders: FloatArray | None
+    ) -> None:
+        """Take the equilibria of the rows, and the sliders of dry friction before each."""
+        self._sliders = sliders
         self.predictor, self.values, self.model = predictor, values, model
         self.at = EquilibriumDerivatives(model, states)
         """The equilibria, for derivatives."""
@@ -66,20 +71,10 @@ class Prediction:
 
     def slopes(self) -> dict[str, FloatArray]:
         """Derivatives of the differences by the parameters, shape (n, k, P)."""
-        if self.predictor.in_order:
-            return self._slopes_of_course()
+        if self.predictor.by_differences:
+            parameters = self.predictor.parameters
+            return slopes_of_course(lambda values: self.predictor.course(values).differences(), parameters, self.values)
         return {key: one.slopes() for key, one in self.seen.items()}
-
-    def _slopes_of_course(self) -> dict[str, FloatArray]:
-        slopes = {key: np.zeros((*values.shape, len(self.values))) for key, values in self.differences().items()}
-        for number, one in enumerate(self.predictor.parameters.parameters):
-            step = _STEP * (abs(self.values[number]) or 1.0)
-            ends = np.clip(self.values[number] + np.array([-step, step]), one.lower, one.upper)
-            low, high = (np.where(np.arange(len(self.values)) == number, end, self.values) for end in ends)
-            below, above = (self.predictor.course(values).differences() for values in (low, high))
-            for key, slope in slopes.items():
-                slope[..., number] = (above[key] - below[key]) / (ends[1] - ends[0])
-        return slopes
 
     def frame(self, name: str) -> tuple[FloatArray, FloatArray]:
         """Position, shape (n, 3) [m], and rotation, (n, 3, 3), of a frame or marker, in the frame of the measurements."""
@@ -112,6 +107,16 @@ class Prediction:
 
     def along(self, rows: AdjointRows) -> FloatArray:
         """Derivatives of outputs of the robot, in its own axes, by all parameters, shape (n, L, P)."""
+        direct = self._without_memory(rows)
+        return direct if self._sliders is None else direct + rows.virtual @ self._friction
+
+    @cached_property
+    def _friction(self) -> FloatArray:
+        """Change by the parameters of the load of friction on the strains at fixed strains, shape (n, n_strains, P)."""
+        return friction_loads(self.at, self._sliders, self.predictor.change, self._without_memory)  # type: ignore[arg-type]
+
+    def _without_memory(self, rows: AdjointRows) -> FloatArray:
+        """The same where the sliders of friction stay, and its moments."""
         predictor = self.predictor
         slopes = rows.by_numbers(predictor.change) + rows.by_actuators @ predictor.actuator_slopes
         turned = predictor.parameters.places("base")
@@ -150,6 +155,9 @@ class Predictor:
         self.parameters, self.measurements = parameters, measurements
         self.in_order = parameters.present.structure.friction is not None
         """Whether the robot has dry friction, so that each row comes from the row before."""
+        structure = parameters.present.structure
+        self.by_differences = self.in_order and (structure.guided or structure.muscle_lengths is not None)
+        """Whether derivatives are differences of the whole course."""
         self.change = ModelChange(len(parameters.names), {})
         """Derivatives of the model's numbers, as `refresh` left them."""
         self.actuator_slopes: FloatArray = np.zeros((parameters.present.n_motors, len(parameters.names)))
@@ -167,7 +175,7 @@ class Predictor:
         Raises:
             ParameterError: If the structure of the robot changes with a parameter there.
         """
-        if self.in_order:
+        if self.by_differences:
             return
         self.change = model_change(self.parameters, values)
         self.actuator_slopes = self._offsets.copy()
@@ -189,9 +197,9 @@ class Predictor:
     def course(self, values: FloatArray) -> Prediction:
         """Return the same, solved anew."""
         model = self.parameters.model(values)
-        return Prediction(self, np.array(values), model, self._solve(model, values))
+        return Prediction(self, np.array(values), model, *self._solve(model, values))
 
-    def _solve(self, model: SoftModel, values: FloatArray) -> States:
+    def _solve(self, model: SoftModel, values: FloatArray) -> tuple[States, FloatArray | None]:
         measurements, (_, turn) = self.measurements, self.parameters.base(values)
         motors = measurements.motor_coordinates(model) + self.parameters.motor_offsets(values)
         loads = {name: np.asarray(wrench) for name, wrench in wrenches_on(model, measurements.loads).items()}
@@ -200,8 +208,8 @@ class Predictor:
         if np.any(turn):
             rotation = np.asarray(pin.exp3(turn))
             loads = {name: (load.reshape(-1, 3) @ rotation).reshape(load.shape) for name, load in loads.items()}
-        starts = np.tile(model.rest, (len(motors), 1)) if self._springs is None else self._springs
-        states = list(self._equilibria(model, motors, loads, starts))
+        sliders: list[FloatArray] = []
+        states = list(self._equilibria(model, motors, loads, sliders))
         lost = [measurements.where(row) for row, state in enumerate(states) if state is None]
         if lost:
             words = ", ".join(lost[:10]) + (f" and {len(lost) - 10} more" if len(lost) > 10 else "")
@@ -213,17 +221,20 @@ class Predictor:
         self._springs = np.array([state.q_springs for state in found])
         of_actuators, coupling = ([getattr(state.load, name) for state in found] for name in ("motors", "coupling"))
         tangent = [state.tangent for state in found]
-        return States(motors, self._springs, loads, *(np.array(one) for one in (of_actuators, tangent, coupling)))
+        at = States(motors, self._springs, loads, *(np.array(one) for one in (of_actuators, tangent, coupling)))
+        return at, np.array(sliders) if self.in_order else None
 
     def _equilibria(
-        self, model: SoftModel, motors: FloatArray, loads: dict[str, FloatArray], starts: FloatArray
+        self, model: SoftModel, motors: FloatArray, loads: dict[str, FloatArray], sliders: list[FloatArray]
     ) -> Iterable[ElasticState | None]:
+        """Search from the equilibria of the values before, then from rest or the row before; appends sliders of friction."""
         now, before = untouched(model), np.asarray(model.rest)
-        for row, (load, start) in enumerate(zip(self._cases(loads), starts, strict=True)):
-            first = before if self.in_order else start
-            state = balanced_state(now, motors[row], load, first, tolerance=_TOLERANCE)
-            if state is None and not self.in_order:
-                state = balanced_state(model, motors[row], load, model.rest, tolerance=_TOLERANCE)
+        for row, load in enumerate(self._cases(loads)):
+            state = None
+            if self.in_order:
+                sliders.append(memory_of(now).bending)
+            for start in (self._springs[row], before) if self._springs is not None else (before,):
+                state = state or balanced_state(now, motors[row], load, start, tolerance=_TOLERANCE)
             if state is not None and self.in_order:
                 now, before = after_step(now, motors[row], state.q_springs), state.q_springs
             yield state

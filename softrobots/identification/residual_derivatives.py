@@ -192,7 +192,7 @@ class AdjointRows:
     def _differentiate(self, strains: FloatArray, *, works: bool = True) -> tuple[FloatArray, FloatArray]:
         """Derivatives of pose and work, by motor joints and strains, at fixed virtual rates of strains, (N, L, n_strains)."""
         at, by_twist = self._at, self._by_pose
-        self._virtual, self._others, self._of_actuators = strains, dict[str, FloatArray](), dict[str, FloatArray]()
+        self.virtual, self._others, self._of_actuators = strains, dict[str, FloatArray](), dict[str, FloatArray]()
         if works:
             rates = at.joint_rates(self._weights[..., : at.n_joint_motors], strains)
             of_work, self._others = at.tree.work_slopes(rates)
@@ -209,12 +209,12 @@ class AdjointRows:
 
     def by_numbers(self, change: ModelChange) -> FloatArray:
         """Derivatives of the outputs by the parameters of a change of the model, shape (N, L, P)."""
-        at, total = self._at, np.zeros((*self._virtual.shape[:2], change.n_parameters))
+        at, total = self._at, np.zeros((*self.virtual.shape[:2], change.n_parameters))
         found = self._others | self._of_actuators
         if "placements" in change.by_number:
             found["placements"] = at.tree.at_placements(self._by_twist)
         if not change.by_number.keys().isdisjoint(("stiffness", "rest", "moments")):
-            found |= at.springs.slopes(self._virtual)
+            found |= at.springs.slopes(self.virtual)
         if at.slopes is not None and at.actuators is not None:
             found |= self._of_held_directions(at.actuators)
         for name in found.keys() & change.by_number.keys():
@@ -237,7 +237,7 @@ class AdjointRows:
         inverse = np.linalg.pinv(at.numbers["held_slopes"])
         missed = at.numbers["path_rest"] + actuators.changes - at.inputs
         sums = at.states.actuator_loads[:, at.n_joint_motors :] @ inverse
-        felt = self._weights[..., at.n_joint_motors :] - actuators.arms(self._virtual)
+        felt = self._weights[..., at.n_joint_motors :] - actuators.arms(self.virtual)
         slopes = sums[:, None, :, None] * felt[..., None, :] + (self._lengths @ inverse)[..., None] * missed[:, None, None]
         if self._outputs.springs is None:
             return {"held_slopes": slopes}

@@ -30,7 +30,9 @@ from softrobots.model.actuator_laws import ROUNDING
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.sections import SectionRow
 
-_BENDING_STICK = 1e-4  # of a section [rad]
+BENDING_STICK = 1e-4
+"""Stick of a section that bends [rad]."""
+
 _GUIDE_STICK = 1e-5  # of an actuator, relative to its length at rest
 
 
@@ -62,11 +64,12 @@ class DryFriction:
         rubbing = [row for row in sections if row.segment in bending]
         self.limit = read_only(np.array([bending[row.segment] for row in rubbing]))
         """Moment of the friction of each section that has some, shape (n_sections,) [N m]."""
-        self._places = np.array([[row.places[name] for name in STRAINS[:2]] for row in rubbing], dtype=np.intp).reshape(-1, 2)
+        self.places = np.array([[row.places[name] for name in STRAINS[:2]] for row in rubbing], dtype=np.intp).reshape(-1, 2)
+        """Places of its bending among the strains, shape (n_sections, 2)."""
         self._paths, self._count, self._relaxed = paths, len(relaxed), relaxed
         self.guided = bool(tags) and bool(guides)
         """Whether an actuator rubs in its guides."""
-        self.rounding = ROUNDING * np.pi * float(np.linalg.norm(self.limit)) / _BENDING_STICK
+        self.rounding = ROUNDING * np.pi * float(np.linalg.norm(self.limit)) / BENDING_STICK
         """Rounding of the moments of friction [N m]: that of an angle times the stiffness of the stick."""
         self.coefficient = np.zeros(0)
         """Coefficient of friction of each guide, shape (n_guides,) [-]."""
@@ -87,13 +90,13 @@ class DryFriction:
     def untouched(self) -> FrictionMemory:
         """The memory of a robot at rest that nothing has moved yet."""
         pieces = self._paths.at(self._relaxed).pieces if self.guided else np.zeros(0)
-        return FrictionMemory(self._relaxed[self._places], np.zeros(self.n_guides), pieces)
+        return FrictionMemory(self._relaxed[self.places], np.zeros(self.n_guides), pieces)
 
     def after(self, strains: FloatArray, memory: FrictionMemory) -> FrictionMemory:
         """Return the memory after a step to strains, shape (count,)."""
-        apart = strains[self._places] - memory.bending
-        share = np.minimum(1.0, _BENDING_STICK / np.maximum(np.linalg.norm(apart, axis=1), _BENDING_STICK))
-        bending = strains[self._places] - apart * share[:, None]
+        apart = strains[self.places] - memory.bending
+        share = np.minimum(1.0, BENDING_STICK / np.maximum(np.linalg.norm(apart, axis=1), BENDING_STICK))
+        bending = strains[self.places] - apart * share[:, None]
         if not self.guided:
             return FrictionMemory(bending, memory.slip, memory.pieces)
         pieces = self._paths.at(strains).pieces
@@ -116,15 +119,15 @@ class DryFriction:
 
     def at(self, strains: FloatArray, memory: FrictionMemory, grip: FloatArray) -> tuple[float, FloatArray, FloatArray]:
         """Return what a step adds to the energy [J], the torque on the strains, shape (count,), and their stiffness."""
-        apart = strains[self._places] - memory.bending
+        apart = strains[self.places] - memory.bending
         size = np.linalg.norm(apart, axis=1)
-        reach = np.maximum(size, _BENDING_STICK)
-        energy = float(self.limit @ _dissipated(size, _BENDING_STICK))
+        reach = np.maximum(size, BENDING_STICK)
+        energy = float(self.limit @ _dissipated(size, BENDING_STICK))
         torque, stiffness = np.zeros(self._count), np.zeros((self._count, self._count))
-        torque[self._places] = apart * (self.limit / reach)[:, None]
-        along = apart / reach[:, None] * (size > _BENDING_STICK)[:, None]
+        torque[self.places] = apart * (self.limit / reach)[:, None]
+        along = apart / reach[:, None] * (size > BENDING_STICK)[:, None]
         blocks = (np.eye(2) - along[:, :, None] * along[:, None, :]) * (self.limit / reach)[:, None, None]
-        stiffness[self._places[:, :, None], self._places[:, None, :]] = blocks
+        stiffness[self.places[:, :, None], self.places[:, None, :]] = blocks
         if self.guided:
             paths = self._paths.at(strains)
             slip = self._slipped(paths.pieces, memory)
@@ -139,10 +142,10 @@ class DryFriction:
 
     def sticks(self, strains: FloatArray, memory: FrictionMemory) -> bool:
         """Return whether nothing slips at strains, shape (count,)."""
-        apart = np.linalg.norm(strains[self._places] - memory.bending, axis=1)
+        apart = np.linalg.norm(strains[self.places] - memory.bending, axis=1)
         if self.guided and np.any(np.abs(self._slipped(self._paths.at(strains).pieces, memory)) > self._stick):
             return False
-        return not np.any(apart > _BENDING_STICK)
+        return not np.any(apart > BENDING_STICK)
 
     def _slipped(self, pieces: FloatArray, memory: FrictionMemory) -> FloatArray:
         """Displacement of the actuators from the sliders of their guides, shape (n_guides,) [m]."""

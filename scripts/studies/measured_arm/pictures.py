@@ -95,6 +95,13 @@ def percent(values: FloatArray, bins: FloatArray) -> dict[str, FloatArray]:
     return {"x": np.minimum(MM * values, bins[-1] - 0.1), "bins": bins, "weights": np.full(len(values), 100.0 / len(values))}
 
 
+def by_movement(compared: Sequence[Compared]) -> Any:
+    """Errors by family of movements."""
+    figure = canvas.new_figure((8.5, 3.9))
+    _boxes(figure.subplots(), compared)
+    return figure
+
+
 def _boxes(axes: Any, compared: Sequence[Compared]) -> None:
     """Errors by family of movements."""
     named = [(one, family) for one in compared for family in one.by_family()]

@@ -1,0 +1,85 @@
+"""Fits of robots that remember: derivatives through the sliders of dry friction, rows in order, and where the base stands."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import softrobots as sr
+from softrobots.identification.parameters import ParameterSet
+from softrobots.identification.prediction import Predictor
+
+ARM = {"segment_lengths": (0.06, 0.05), "elastic_sections": 1, "bending_friction": (2e-3, 1e-3)}
+
+
+def wandering(rng: np.random.Generator, rows: int, **fields: Any) -> tuple[sr.TendonArm, sr.Measurements]:
+    """An arm, and its tip at random pulls, each from where the last one left it."""
+    arm = sr.TendonArm(**{**ARM, **fields})
+    model = sr.load_model(arm)
+    pulls = rng.uniform(-2e-3, 5e-3, (rows, model.n_motors))
+    at, tips = None, []
+    for pull in pulls:
+        at = sr.solve_equilibrium(model, model.relaxed_motors - pull, previous=at, tolerance=1e-12)
+        tips.append(at.tip_position)
+    labels = [f"path {row // 10}" for row in range(rows)]
+    return arm, sr.Measurements(pulls, tip_position=tips, relative=True, labels=labels, markers={"tip": "tip"})
+
+
+NAMES = (
+    "base.rotation", "marker.tip.offset", "offset[2]", "segment[*].bending_stiffness", "axial_stiffness", "motor[2].offset",
+    "tendon[1,2].tendon_stiffness", "tendon[3].tendon_distance", "segment[1].rest_bend_x", "bending_friction",
+)  # fmt: skip
+
+
+def test_derivatives_go_through_what_friction_remembers(rng: np.random.Generator) -> None:
+    """Central differences of whole paths; sliders turn within a stick of 1e-4 rad, which steps of 1e-6 see: about 1e-4."""
+    arm, measured = wandering(rng, 20, bending_friction=2e-3, rest_bend_y=0.05)
+    parameters = ParameterSet.of(arm, NAMES, measured.markers)
+    predictor, values = Predictor(parameters, measured), np.array(parameters.values)
+    predictor.refresh(values)
+    slopes = predictor.at(values).slopes()["positions.tip"]
+    for place, value in enumerate(values):
+        step = 1e-6 * (abs(value) or 0.3)
+        ends = [predictor.at(values + sign * step * np.eye(len(values))[place]).differences() for sign in (1, -1)]
+        expected = (ends[0]["positions.tip"] - ends[1]["positions.tip"]) / (2.0 * step)
+        assert np.abs(slopes[..., place] - expected).max() < 1e-3 * np.abs(expected).max(), parameters.names[place]
+    loose = sr.TendonArm(**{**ARM, "bending_friction": 0.0})
+    without = Predictor(ParameterSet.of(loose, NAMES[:-1], measured.markers), measured)
+    without.refresh(values[:-1])
+    missed = np.abs(without.at(values[:-1]).slopes()["positions.tip"] - slopes[..., :-1]).max(axis=(0, 1))
+    assert np.any(missed > 0.1 * np.abs(slopes[..., :-1]).max(axis=(0, 1)))  # they are others without friction
+
+
+def test_friction_is_fitted_to_rows_in_order(rng: np.random.Generator) -> None:
+    """Without noise the moments of friction and the stiffness come back; rows kept aside are predicted where they stand."""
+    arm, measured = wandering(rng, 40)
+    names = ("segment[*].bending_friction", "segment[2].bending_stiffness", "motor[3].offset")
+    start = sr.TendonArm(**{**ARM, "bending_friction": 1.2e-3})
+    aside = np.array([label == "path 2" for label in measured.labels or ()])
+    fit = sr.identify(start, measured, names, validation=aside)
+    assert fit.values["segment[1].bending_friction"] == pytest.approx(2e-3, rel=1e-3)
+    assert fit.values["segment[2].bending_friction"] == pytest.approx(1e-3, rel=1e-3)
+    assert fit.values["segment[2].bending_stiffness"] == pytest.approx(arm.bending_in_force[1], rel=1e-3)
+    assert fit.validation is not None
+    assert fit.validation.residuals["positions.tip"].shape == (10, 3)
+    assert np.abs(fit.validation.residuals["positions.tip"]).max() < 2e-5
+
+
+def test_a_robot_that_stands_turned_away_is_found(rng: np.random.Generator) -> None:
+    """Half a turn from where the fit begins, least squares alone end beside the best."""
+    _, measured = wandering(rng, 15, bending_friction=0.0)
+    pose = Rotation.from_rotvec((0.2, -0.1, 3.0))
+    shift = np.array([0.1, -0.2, 0.3])
+    seen = pose.apply(np.array(measured.measured["positions.tip"])) + shift
+    other = sr.Measurements(measured.q_motors, tip_position=seen, relative=True)
+    start = sr.TendonArm(**{**ARM, "bending_friction": 0.0}, bending_stiffness=2e-3)
+    fit = sr.identify(start, other, ("base.position", "base.rotation", "bending_stiffness"))
+    values = fit.values
+    turn = Rotation.from_rotvec([values[f"base.rotation.{axis}"] for axis in "xyz"])
+    assert (turn * pose.inv()).magnitude() < 1e-6
+    assert np.allclose([values[f"base.position.{axis}"] for axis in "xyz"], shift, atol=1e-7)
+    assert values["bending_stiffness"] == pytest.approx(50e9 * math.pi * 0.0005**4 / 4.0, rel=1e-5)
