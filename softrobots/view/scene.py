@@ -133,6 +133,10 @@ class SceneBuilder:
         """Return a loaded robot, its forces and the colours of its inflated links."""
         return self._scene(Frame(0, equilibrium.q_motors, equilibrium.q_springs, equilibrium))
 
+    def state(self, q_motors: FloatArray, q_springs: FloatArray, load: Load, tensions: FloatArray) -> Scene:
+        """Return a robot under a load at given coordinates, with the tension of each muscle, shape (n_muscles,) [N]."""
+        return self._scene(Frame(0, q_motors, q_springs, None, load=load, tensions=tensions))
+
     def chain(self, q: FloatArray) -> Scene:
         """Return the chain alone at a configuration of Pinocchio, shape (nq,), without load."""
         poses = self.robot.transforms(q)

@@ -38,6 +38,8 @@ class RobotDrawing:
         self._body = BodyDrawing(root["body"])
         self._traced = self._marked = False
         self._animated: tuple[Scene, ...] = ()
+        self.notes: list[LegendEntry] = []
+        """Further entries of the legend."""
         self.show(scene)
 
     def show(self, scene: Scene) -> None:
@@ -98,7 +100,8 @@ class RobotDrawing:
 
     def legend(self) -> list[LegendEntry]:
         """Return colour and meaning of what is drawn."""
-        return legend(self._shapes, self._scene, self._animated, path=self._traced, target=self._marked)
+        drawn = legend(self._shapes, self._scene, self._animated, path=self._traced, target=self._marked)
+        return drawn + self.notes
 
     def _add_frame(self, animation: Any, number: int, scene: Scene) -> None:
         self._chain.add_frame(animation, number, scene)
