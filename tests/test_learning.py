@@ -149,6 +149,19 @@ def test_rows_of_parameters_are_robots_of_their_own() -> None:
         assert tips[row] == pytest.approx(batch.tip_positions, abs=1e-14)
 
 
+def test_cases_that_the_passes_do_not_solve_start_at_the_rest_of_their_robot() -> None:
+    """An arm with angles of rest that are parameters has the answers of `softrobots.compile` of that robot, under any load."""
+    arm = sr.InflatableArm(rest_up=0.2)
+    solver = Differentiable("equilibrium", arm, "rest_up", gravity=None, **(OPTIONS | {"failed": "nan"}))
+    random = np.random.default_rng(3)
+    motors, forces = random.uniform(-3.0, 3.0, (300, 3)), random.normal(size=(300, 3)) * 80.0
+    springs, _ = solver.solve(motors, forces, np.array([-0.4]))
+    batch = sr.compile(sr.load_model(replace(arm, rest_up=-0.4)), backend="python").equilibria(motors, forces)
+    assert np.array_equal(batch.certified, np.isfinite(springs[:, 0]))
+    assert springs[batch.certified] == pytest.approx(batch.q_springs[batch.certified], abs=1e-9)
+    assert batch.certified.mean() > 0.9
+
+
 def test_what_has_no_compiled_derivatives_is_refused_by_name() -> None:
     options = OPTIONS | {"gravity": None}
     with pytest.raises(sr.ParameterError, match=r"pcc_arm.*without sections and muscles"):

@@ -71,7 +71,7 @@ class Layout:
     actuators: int = field(init=False)
     """Input of each muscle, without constrained sums: length, or that of the motor [m], tension [N] or pressure [Pa]."""
     start: int = field(init=False)
-    """Start of the search where muscle lengths constrain sums of the unknowns [rad or m]; others start at rest."""
+    """Start of the search where muscle lengths constrain sums of the unknowns, or rest is an input; others start at rest."""
     unknown: int = field(init=False)
     """The unknown strains [rad or m]."""
     step: int = field(init=False)

@@ -210,9 +210,9 @@ def descend(w: Array) -> int:
 
 
 def go_to_start(w: Array) -> None:
-    """Set the unknowns to rest, or to `START` where muscle lengths constrain sums of them."""
+    """Set the unknowns to rest, or to `START` where muscle lengths constrain sums of them, or rest is an input."""
     for i in range(N):
-        if N_CONSTRAINTS > 0:
+        if N_STARTS > 0:
             w[UNKNOWN + i] = w[START + i]
         else:
             w[UNKNOWN + i] = REST[i]

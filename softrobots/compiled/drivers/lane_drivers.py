@@ -93,6 +93,7 @@ def settle_batch(
             statuses[begin + lane] = CERTIFIED
             if not is_solved(lanes, lane):
                 load_case(case, inputs, places, begin + lane)
+                prepare(case)
                 go_to_start(case)
                 statuses[begin + lane] = settle_from(case)
                 store_case(case, outputs, result_places, begin + lane)

@@ -165,6 +165,7 @@ def estimate(w: Array) -> int:
         return estimated(w)
     for i in range(3):
         w[FORCE + i] = 0.0
+    prepare(w)
     go_to_start(w)
     return search(w, FORCE, 3)
 

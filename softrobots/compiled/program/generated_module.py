@@ -138,6 +138,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "LANE_SIZE": lane_size,
         "LANES": lane_count(lane_size),
         "N_CONSTRAINTS": unknowns.n_constraints,
+        "N_STARTS": layout.unknowns if unknowns.n_constraints or layout.inputs else 0,
         "N_INPUTS": unknowns.n_tensions,
         "LEAST_INPUT": unknowns.least_inputs,
         **{status.name: status.value for status in Status},

@@ -6,7 +6,7 @@ from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unrolled_chain import Evaluation, evaluate
 from softrobots.compiled.program.passes import decide, dot, go_on, point_numbers
 from softrobots.compiled.trace.blocks import Block, hoist
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.expressions import Scalar, scalar
 
 
 def equilibrium_blocks(plan: Plan) -> tuple[list[Block], int]:
@@ -14,6 +14,9 @@ def equilibrium_blocks(plan: Plan) -> tuple[list[Block], int]:
     layout = plan.layout
     prepare = Block("prepare", "Compute what depends on motors and load only.")
     trace = prepare.trace
+    if plan.inputs is not None:
+        chain = plan.numbers_in(prepare)
+        prepare.store_all(layout.start, [scalar(chain.rest[strain]) for strain in plan.unknowns.strains])
     newton_pass = Block("newton_pass", "Evaluate the point, and take a Newton step.", trace=trace)
     _advance(plan, newton_pass, evaluate(plan, newton_pass))
     evaluation = Block("evaluate", "Evaluate the point: Newton step, energy, residual, pivots.", trace=trace)
