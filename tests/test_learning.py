@@ -162,6 +162,32 @@ def test_cases_that_the_passes_do_not_solve_start_at_the_rest_of_their_robot() -
     assert batch.certified.mean() > 0.9
 
 
+def test_a_cantilever_without_motors_has_the_slopes_of_its_closed_form() -> None:
+    """Small loads on hinges that share a stiffness: the tip moves by force over stiffness, whatever else there is."""
+    rod = sr.PccArm(
+        segment_lengths=(0.5,),
+        muscle_azimuths=(),
+        bending_stiffness=2.0,
+        chain="lumped",
+        hinges=4,
+        torsion=False,
+        extension=False,
+    )
+    solver = Differentiable("equilibrium", rod, "bending_stiffness", gravity=None, **OPTIONS)
+    force = np.array([1e-6, 0.0, 0.0])
+    inputs = [np.zeros(0), force, solver.present]
+    results = solver.solve(*inputs)
+    (by_force,) = (
+        one
+        for one in solver.pull(inputs, results, [np.zeros(8), np.array([1.0, 0.0, 0.0])], [None, (), None])
+        if one is not None
+    )
+    sag = results[1][0]
+    assert by_force[0] == pytest.approx(sag / 1e-6, rel=1e-9)
+    _, _, by_stiffness = solver.pull(inputs, results, [np.zeros(8), np.array([1.0, 0.0, 0.0])], [None, None, ()])
+    assert by_stiffness == pytest.approx([-sag / 2.0], rel=1e-9)
+
+
 def test_what_has_no_compiled_derivatives_is_refused_by_name() -> None:
     options = OPTIONS | {"gravity": None}
     with pytest.raises(sr.ParameterError, match=r"pcc_arm.*without sections and muscles"):

@@ -174,7 +174,7 @@ class Differentiable:
     def _offsets(self) -> FloatArray:
         """Derivative of the true motor coordinates by the parameters, shape (n_motors, P)."""
         columns = [self._set.motor_offsets(row) for row in np.eye(len(self.present))]
-        return np.ascontiguousarray(np.reshape(columns, (-1, self.model.n_motors)).T)
+        return np.ascontiguousarray(np.reshape(columns, (len(columns), self.model.n_motors)).T)
 
     def _true(self, motors: FloatArray, values: tuple[float, ...]) -> FloatArray:
         offsets = self._offsets @ np.array(values)
