@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import json
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -20,6 +21,7 @@ from softrobots.identification.identify import LOSSES
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
 from softrobots.robots.parameter_file import read_robot, write_parameters
+from tests.conftest import CHECKOUT, load_script
 from tests.support.laws import law
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
@@ -362,6 +364,39 @@ def test_what_cannot_be_fitted_is_refused(
 ) -> None:
     with pytest.raises(kind, match=words):
         sr.identify(ARM, noisy, names, **more)
+
+
+def test_intervals_cover_as_often_as_they_say() -> None:
+    recorded = json.loads((CHECKOUT / "docs" / "validation" / "interval_coverage.json").read_text(encoding="utf-8"))
+    page = (CHECKOUT / "docs" / "validation.md").read_text(encoding="utf-8")
+    assert recorded["fits"] == 1000
+    for kind, shares in recorded["coverage"].items():
+        cells = " | ".join(f"{share:.1f} %" for share in shares.values())
+        assert f"| {kind} | {cells} |" in page
+        assert all(93.0 <= share <= 97.0 for share in shares.values()), kind
+
+
+@pytest.mark.study
+def test_the_script_of_the_coverage_prints_a_table(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    words = ["--fits", "2", "--output", str(tmp_path / "a.json")]
+    script = load_script("interval_coverage")
+    assert script.main(words) == 0
+    assert "| blocks | " in capsys.readouterr().out
+    assert script.main(words) == 2  # the file is there
+    assert script.main(["--fits", "0"]) == 2
+
+
+def test_one_row_tells_three_combinations_and_the_rest_keeps_its_start() -> None:
+    data = sr.Measurements([[0.3, 0.4, -0.5]], force=[[1.0, 8.0, -9.0]], tip_position=[[0.9, 0.35, 0.02]])
+    names = ("link[*].stiffness", "base.position", "motor[2].offset")
+    found = sr.identify(ARM, data, names)
+    assert found.held == 3
+    assert np.abs(found.residuals["positions.tip"]).max() < 1e-9
+    assert all(np.isinf(high) for _, high in found.intervals.values())
+    assert found.by_blocks is None
+    assert "not determined" in found.summary()
+    with pytest.raises(sr.ParameterError, match="at least one number"):
+        sr.identify(ARM, sr.Measurements(np.zeros((2, 3)), tip_position=[[np.nan] * 3, [1.0] * 3], mask=[True, False]), names)
 
 
 def test_rows_without_an_equilibrium_are_named() -> None:

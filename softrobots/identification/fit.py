@@ -21,6 +21,7 @@ INTERRUPTED = "interrupted: the best values up to then"
 """Message of a fit that Ctrl-C has ended."""
 
 _ROUNDS = 6  # most searches, each with derivatives of the model's numbers of where the last one ended
+_FARTHEST = 100.0  # factor by which a search changes a positive parameter at most; the next one goes on
 _NEAR = 0.01  # change of the parameters, relative, up to which those derivatives are good enough on the way
 _SAME = 1e-8  # share of the cost that a further step may gain at the end: 0.005 standard errors with 1000 rows
 _SAME_RUBBING = 1e-5  # the same of a robot with dry friction: where rows begin to slip, the cost has kinks
@@ -150,7 +151,7 @@ class Fit:
         from scipy.optimize import least_squares
 
         x = self._coordinates(start)
-        self._anchor = x
+        self._anchor = self._middle = x
         self._refresh(x)
         self._held = self._null(x)
         limits = self.predictor.parameters
@@ -159,7 +160,7 @@ class Fit:
                       for ends in (limits.lower, limits.upper)]  # fmt: skip
         try:
             for _ in range(_ROUNDS if most else 0):
-                left = max(1, most - len(self.course))
+                left, self._middle = max(1, most - len(self.course)), x
                 found = least_squares(
                     self._rows, x, self._jacobian, bounds, x_scale="jac", loss=self._loss, ftol=self._same, xtol=1e-9,
                     gtol=1e-12, max_nfev=left,
@@ -221,6 +222,8 @@ class Fit:
 
     def _rows(self, x: FloatArray) -> FloatArray:
         """All rows; infinite where the robot refuses the values or has no equilibrium, so that the step is refused."""
+        if np.any(self._logarithmic & (np.abs(x - self._middle) > np.log(_FARTHEST))):
+            return np.full(self._count, np.inf)
         try:
             prediction = self._at(x)
         except (SoftRobotsError, ArithmeticError):

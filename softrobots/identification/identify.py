@@ -24,7 +24,7 @@ from softrobots.identification.fit import INTERRUPTED, Fit, Prior, Weights
 from softrobots.identification.identification import Identification, identification_of
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
-from softrobots.identification.prediction import Predictor
+from softrobots.identification.prediction import QUANTITIES, Predictor
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 """Losses of `identify`."""
@@ -78,12 +78,15 @@ def identify(
     """
     instance_of("measurements", measurements, Measurements, "Measurements")
     choice("loss", loss, LOSSES)
+    for key in measurements.measured:
+        if key.partition(".")[0] not in QUANTITIES:
+            raise ParameterError("measurements", key, f"of quantities that are fitted: {', '.join(QUANTITIES)}")
     most, count = positive_integer("max_iterations", max_iterations), positive_integer("starts", starts)
     chosen = ParameterSet.of(robot, parameters, measurements.markers)
     loads = [one.name for one in chosen.parameters if one.place.kind in ("motor", "force", "wrench", "gravity")]
     if loads:
         raise ParameterError("parameters", loads[0], "no load or actuator coordinate: measurements give those")
-    prior = prior_of(chosen, parameters, priors or {})
+    prior = prior_of(chosen, priors or {})
     counted, aside = _split(measurements, validation)
     in_order = chosen.present.structure.friction is not None
     rows = measurements if in_order else measurements[counted]
@@ -97,6 +100,8 @@ def identify(
         predictor = Predictor(chosen, rows)
         values[0] = _mounted(predictor, values[0], counted)
         weights = Weights.of(rows.std, predictor.at(values[0]).differences(), counted)
+        if not len(weights.rows()):
+            raise ParameterError("measurements", measurements, "with at least one number in a row that counts")
         robust = loss if weights.known else "linear"
         if every > 1 and not in_order:
             few = Predictor(chosen, rows[::every])
@@ -189,21 +194,20 @@ def _starts(chosen: ParameterSet, seed: int, count: int) -> list[FloatArray]:
     return found
 
 
-def prior_of(chosen: ParameterSet, parameters: str | Sequence[str], priors: Mapping[str, tuple[Any, Any]]) -> Prior:
-    """Return the priors by scalar parameter, from names of scalars, or of several as they are in the list of parameters.
+def prior_of(chosen: ParameterSet, priors: Mapping[str, tuple[Any, Any]]) -> Prior:
+    """Return the priors by scalar parameter, from names of scalars, or of several as they were asked for.
 
     Raises:
         ParameterError: If one is no pair of finite numbers, or a parameter has two.
         NameNotFound: If there is no such parameter among those of the list.
     """
-    listed = [parameters] if isinstance(parameters, str) else list(parameters)
     places: list[int] = []
     means: list[float] = []
     stds: list[float] = []
     for name, pair in dict(priors).items():
-        members = ParameterSet.of(chosen.present, name, chosen.markers).names if name in listed else (name,)
+        members = chosen.asked.get(name, (name,))
         if not set(members) <= set(chosen.names):
-            raise NameNotFound("fitted parameter", str(name), dict.fromkeys([*listed, *chosen.names]))
+            raise NameNotFound("fitted parameter", str(name), dict.fromkeys([*chosen.asked, *chosen.names]))
         if not isinstance(pair, tuple | list) or len(pair) != 2:
             raise ParameterError(f"priors[{name!r}]", pair, "a pair: mean and standard deviation")
         mean, std = finite_array(f"priors[{name!r}]", pair[0], None), positive_array(f"priors[{name!r}]", pair[1], "")

@@ -107,7 +107,7 @@ def informative_poses(
     counted = np.flatnonzero(candidates.mask)
     if positive_integer("n", n) > len(counted):
         raise ParameterError("n", n, f"at most the number of candidates, {len(counted)}")
-    prior = prior_of(chosen, parameters, priors or {})
+    prior = prior_of(chosen, priors or {})
     rates = np.where(chosen.logarithmic, chosen.values, 1.0)
     known = np.zeros(len(rates))
     known[prior.places] = (rates[prior.places] / prior.std) ** 2

@@ -22,7 +22,7 @@ from __future__ import annotations
 import dataclasses
 import warnings
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -50,6 +50,8 @@ class ParameterSet:
     """The scalar parameters."""
     markers: Mapping[str, str]
     """Frame of each marker."""
+    asked: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    """Names of the scalars by each name that was asked for."""
 
     @classmethod
     def of(cls, robot: Any, names: str | Sequence[str], markers: Mapping[str, str] | None = None) -> ParameterSet:
@@ -76,7 +78,11 @@ class ParameterSet:
         if not listed or not all(isinstance(name, str) for name in listed):
             raise ParameterError("parameters", names, 'names of parameters, e.g. ("stiffness", "hinge_offset")')
         registry = Registry(model.robot, model, marked)
-        found = cls(model, tuple(one for name in listed for one in registry.find(name.strip())), marked)
+        each = {name.strip(): registry.find(name.strip()) for name in listed}
+        if len(each) < len(listed):
+            raise ParameterError("parameters", names, "names that are there once")
+        asked = {name: tuple(one.name for one in some) for name, some in each.items()}
+        found = cls(model, tuple(one for some in each.values() for one in some), marked, asked)
         found._check()
         return found
 
