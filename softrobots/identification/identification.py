@@ -56,7 +56,7 @@ class Comparison(NamedTuple):
 
 
 class History(NamedTuple):
-    """The steps of a fit."""
+    """The steps of the last search of a fit, which has all rows and the final weights."""
 
     cost: FloatArray
     """Half the sum of the losses, shape (n,)."""

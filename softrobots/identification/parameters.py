@@ -215,4 +215,17 @@ class ParameterSet:
         if len(set(self.names)) < len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise ParameterError("parameters", twice, "named once")
-        self.robot(self.values)
+        row: Any
+        fields: dict[str, Any] = {}
+        for number, one in self.places("field"):  # without a tape, which a list of names does not need
+            row = fields.setdefault(one.place.names[0], list(one.place.row))
+            for part in one.place.parts:
+                row[part] = self.values[number]
+            if not one.place.parts:
+                fields[one.place.names[0]] = self.values[number]
+        if fields:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", AssumedStiffnessWarning)
+                replace(
+                    self.present.robot, **{name: tuple(row) if isinstance(row, list) else row for name, row in fields.items()}
+                )
