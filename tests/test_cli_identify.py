@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -12,6 +13,8 @@ import numpy as np
 import pytest
 
 import softrobots as sr
+from softrobots.cli import identify as command
+from softrobots.identification.fit import INTERRUPTED
 from softrobots.robots.parameter_file import read_robot
 from tests.support.tables import each_row
 
@@ -109,6 +112,16 @@ def test_a_unit_that_is_wrong_is_told_before_and_after_the_fit(folder: Path, tol
     _, out, err = told(*WORDS, "--fit", "base.position")
     assert "warning: positions.tip spreads over" in err
     assert "hint: positions.tip: dividing it by 1000 (mm (N mm, g) taken for m (N m, kg)" in out
+
+
+@each_row(("message", "status"), [(INTERRUPTED, 130), ("at most 100 steps", 1)])
+def test_a_fit_that_ends_early_is_kept(
+    message: str, status: int, folder: Path, told: Told, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    fit = command.identify
+    monkeypatch.setattr(command, "identify", lambda *args, **kwargs: dataclasses.replace(fit(*args, **kwargs), message=message))
+    assert told(*WORDS, *FIT, "-o", message)[0] == status
+    assert message in (folder / message / "report.txt").read_text(encoding="utf-8")
 
 
 def test_springs_of_a_foreign_file_are_options_of_other_commands(folder: Path, told: Told) -> None:
