@@ -42,6 +42,7 @@ from softrobots.identification.identification import Identification
 from softrobots.identification.identify import identify
 from softrobots.identification.informative_poses import InformativePoses, informative_poses
 from softrobots.identification.measurements import Measurements
+from softrobots.identification.sensitivity import Sensitivity, sensitivity
 from softrobots.model.link_limits import LinkLimits
 from softrobots.model.loader import load_model, with_springs
 from softrobots.model.soft_model import SoftModel
@@ -106,6 +107,7 @@ __all__ = [
     "PccArm",
     "Route",
     "SelfIntersection",
+    "Sensitivity",
     "ShapedTrajectory",
     "SoftModel",
     "SoftRobotsError",
@@ -148,6 +150,7 @@ __all__ = [
     "sample_workspace",
     "save_csv",
     "save_result",
+    "sensitivity",
     "shape_input",
     "simulate",
     "solve_equilibrium",

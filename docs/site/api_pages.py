@@ -98,7 +98,7 @@ PAGES = {
         "Identification",
         "What was measured of a robot, and the parameters that explain it.",
         (
-            *_top("Measurements", "identify", "Identification"),
+            *_top("sensitivity", "Sensitivity", "Measurements", "identify", "Identification"),
             *_top("cross_validate", "CrossValidation", "informative_poses", "InformativePoses"),
             "softrobots.identification.measurement_columns.read_columns",
         ),

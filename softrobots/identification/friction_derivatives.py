@@ -41,7 +41,7 @@ def friction_loads(
     flat, nothing = places.ravel(), np.zeros((count, change.n_parameters))
     rows = np.broadcast_to(np.eye(count)[flat], (n, len(flat), count))
     loads = SliderStates(friction, at.strains, sliders).loads(
-        along(AdjointRows(at, Outputs(springs=rows))).reshape(n, *places.shape, -1),
+        along(AdjointRows(at, Outputs(strains=rows))).reshape(n, *places.shape, -1),
         at.compliance[:, flat[:, None], flat],
         change.by_number.get("bending_friction", nothing[: len(places)]),
         change.by_number.get("rest", nothing)[places],

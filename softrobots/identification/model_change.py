@@ -7,7 +7,7 @@ many states of a model, and those of models nearby while a fit is on its way.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -15,6 +15,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError, SoftRobotsError
+from softrobots.identification.parameter_names import Parameter
 from softrobots.identification.parameters import ParameterSet
 from softrobots.model.numbers import Numbers, model_numbers
 from softrobots.model.soft_model import SoftModel
@@ -70,36 +71,48 @@ def model_change(parameters: ParameterSet, values: Any = None, *, fourth_order: 
     at = np.array(parameters.values if values is None else values, dtype=np.float64)
     base, columns = numbers_of(parameters.model(at)), dict[str, FloatArray]()
     for place in np.flatnonzero(parameters.of_model).tolist():
-        for name, slope in _slopes(parameters, at, place, base, _FOURTH_ORDER if fourth_order else _CENTRAL).items():
+
+        def numbers(value: float, place: int = place) -> Numbers:
+            changed = at.copy()
+            changed[place] = value
+            return model_numbers(parameters.model(changed))
+
+        slopes = differences(parameters.parameters[place], float(at[place]), base, numbers, fourth_order=fourth_order)
+        for name, slope in slopes.items():
             if np.any(slope):
                 column = _twists(base[name], slope) if name in _PLACED else slope.ravel()
                 columns.setdefault(name, np.zeros((column.size, len(at))))[:, place] = column
     return ModelChange(len(at), columns)
 
 
-def _slopes(parameters: ParameterSet, values: FloatArray, place: int, base: Numbers, stencil: Stencil) -> Numbers:
-    """Derivatives of all numbers by one parameter."""
-    one, value = parameters.parameters[place], float(values[place])
-    scale = abs(value) if one.logarithmic else max(abs(value), _TYPICAL.get(one.unit, 1.0))
-    for step, weights in (stencil, _UPWARDS, _DOWNWARDS):
+def differences(
+    parameter: Parameter, value: float, base: Numbers, at: Callable[[float], Numbers], *, fourth_order: bool = False
+) -> Numbers:
+    """Differentiate named arrays by a parameter: central differences, one-sided where it has no room on one side.
+
+    Args:
+        parameter: The parameter.
+        value: Its value.
+        base: The arrays there.
+        at: Returns them at another value.
+        fourth_order: Whether central differences are of fourth order.
+
+    Raises:
+        ParameterError: If the arrays have other shapes to both sides, or the robot refuses values there.
+    """
+    scale = abs(value) if parameter.logarithmic else max(abs(value), _TYPICAL.get(parameter.unit, 1.0))
+    for step, weights in (_FOURTH_ORDER if fourth_order else _CENTRAL, _UPWARDS, _DOWNWARDS):
         tried = {number: value + number * step * scale for number in weights}
-        if not one.lower <= min(tried.values()) <= max(tried.values()) <= one.upper:
+        if not parameter.lower <= min(tried.values()) <= max(tried.values()) <= parameter.upper:
             continue
         try:
-            moved = {number: _numbers_at(parameters, values, place, other) for number, other in tried.items()}
+            moved = [(weight / (step * scale), at(tried[number])) for number, weight in weights.items()]
         except SoftRobotsError:
             continue
-        if all(other[name].shape == base[name].shape for other in moved.values() for name in base):
-            each = [(weight / (step * scale), moved[number]) for number, weight in weights.items()]
-            return {name: np.sum([weight * (other[name] - base[name]) for weight, other in each], axis=0) for name in base}
+        if all(other[name].shape == base[name].shape for _, other in moved for name in base):
+            return {name: np.sum([weight * (other[name] - base[name]) for weight, other in moved], axis=0) for name in base}
     requirement = "a value about which the structure of the robot stays as it is, so that it has derivatives"
-    raise ParameterError(one.name, value, requirement)
-
-
-def _numbers_at(parameters: ParameterSet, values: FloatArray, place: int, value: float) -> Numbers:
-    changed = values.copy()
-    changed[place] = value
-    return model_numbers(parameters.model(changed))
+    raise ParameterError(parameter.name, value, requirement)
 
 
 def _twists(placements: FloatArray, slopes: FloatArray) -> FloatArray:

@@ -20,8 +20,8 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
+from softrobots.identification.derivatives.loaded_tree import cross
 from softrobots.identification.friction_derivatives import friction_loads, slopes_of_course
-from softrobots.identification.loaded_tree import cross
 from softrobots.identification.measured_robot import frame_of, wrenches_on
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import ModelChange, model_change

@@ -16,6 +16,7 @@ At a knee (the end of a plateau, a tendon that goes slack) they are the derivati
 
 from __future__ import annotations
 
+import contextlib
 from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
@@ -24,11 +25,12 @@ import numpy as np
 
 from softrobots.constant_curvature.strain_chain import SectionChain
 from softrobots.core.checks import FloatArray
-from softrobots.identification.actuator_derivatives import ActuatorStates
-from softrobots.identification.loaded_tree import LoadedTree
+from softrobots.identification.derivatives.actuator_derivatives import ActuatorStates
+from softrobots.identification.derivatives.loaded_tree import LoadedTree
+from softrobots.identification.derivatives.spring_derivatives import SpringStates
 from softrobots.identification.model_change import ModelChange, numbers_of
-from softrobots.identification.spring_derivatives import SpringStates
 from softrobots.model.soft_model import SoftModel
+from softrobots.model.springs import POSITIVE
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.sensitivity import inverse_stiffness
 
@@ -71,8 +73,8 @@ class Outputs(NamedTuple):
     """Weights of its position and rotation (world axes), shape (N, L, 6)."""
     loads: FloatArray | None = None
     """Weights of the loads on the actuators, shape (N, L, n_motors)."""
-    springs: FloatArray | None = None
-    """Weights of the elastic coordinates, shape (N, L, n_springs)."""
+    strains: FloatArray | None = None
+    """Weights of the strains, shape (N, L, n_strains): of the elastic coordinates, unless lengths of actuators are given."""
 
 
 class EquilibriumDerivatives:
@@ -116,7 +118,13 @@ class EquilibriumDerivatives:
         Raises:
             NeutralEquilibrium: If one is singular, see `inverse_stiffness`.
         """
-        return np.array([inverse_stiffness(self.model, one) for one in self.states.tangent])
+        stiffness, tangent = self.model.stiffness, self.states.tangent
+        with contextlib.suppress(np.linalg.LinAlgError):
+            inverse: FloatArray = np.asarray(np.linalg.inv(tangent), dtype=np.float64)
+            squares = stiffness @ (inverse * inverse) @ stiffness  # as in `inverse_stiffness`: far from neutral
+            if np.all(squares < POSITIVE**-2):
+                return inverse
+        return np.array([inverse_stiffness(self.model, one) for one in tangent])
 
     def joint_rates(self, motors: FloatArray, strains: FloatArray) -> FloatArray:
         """Rates of the joints, shape (N, L, n_joints), at those of motor joints and of the strains, shape (N, L, ...)."""
@@ -163,7 +171,7 @@ class AdjointRows:
             NeutralEquilibrium: If the tangent stiffness of a state is singular.
         """
         self._at, self._outputs, count = at, outputs, at.n_joint_motors
-        given = next(one for one in (outputs.pose, outputs.loads, outputs.springs) if one is not None)
+        given = next(one for one in (outputs.pose, outputs.loads, outputs.strains) if one is not None)
         shape = given.shape[:2]
         self._weights = np.zeros((*shape, at.model.n_motors)) if outputs.loads is None else outputs.loads
         self._by_pose, self._of_frame = np.zeros((*shape, at.model.pinocchio.nv, 6)), np.zeros((*shape, 6))
@@ -176,12 +184,12 @@ class AdjointRows:
         motors, elastic = self._differentiate(strains, works=outputs.loads is not None)
         by_actuators = np.zeros_like(self._weights)
         by_actuators[..., :count] = motors
+        if outputs.strains is not None:
+            elastic = elastic + outputs.strains
         if at.slopes is not None:
             by_actuators[..., count:], elastic = elastic @ at.slopes[0], elastic @ at.slopes[1]
         elif at.actuators is not None:
             by_actuators[..., count:] = self._weights[..., count:] * at.actuators.by_input[:, None]
-        if outputs.springs is not None:
-            elastic = elastic + outputs.springs
         virtual = elastic @ at.compliance
         self.by_actuators = by_actuators + virtual @ at.states.coupling
         """Derivatives of the outputs by the actuators, shape (N, L, n_motors)."""
@@ -192,56 +200,64 @@ class AdjointRows:
     def _differentiate(self, strains: FloatArray, *, works: bool = True) -> tuple[FloatArray, FloatArray]:
         """Derivatives of pose and work, by motor joints and strains, at fixed virtual rates of strains, (N, L, n_strains)."""
         at, by_twist = self._at, self._by_pose
-        self.virtual, self._others, self._of_actuators = strains, dict[str, FloatArray](), dict[str, FloatArray]()
         if works:
             rates = at.joint_rates(self._weights[..., : at.n_joint_motors], strains)
-            of_work, self._others = at.tree.work_slopes(rates)
-            by_twist = by_twist + of_work
-        motors, by_strains, of_sections = at.by_coordinates(by_twist, strains)
-        self._by_twist, self._others = by_twist, self._others | of_sections
+            self._twists = at.tree.twists(rates)
+            by_twist = by_twist + at.tree.work_slopes(rates, self._twists)
+        motors, by_strains, self._others = at.by_coordinates(by_twist, strains)
+        self.virtual, self._by_twist = strains, by_twist
         if works:
             by_strains = by_strains - at.springs.tangent(strains)
         if works and at.actuators is not None:
             tensions = self._weights[..., at.n_joint_motors :]
-            of_actuators, self._of_actuators = at.actuators.slopes(self._lengths, tensions, strains)
-            by_strains = by_strains + of_actuators
+            of_actuators, others = at.actuators.slopes(self._lengths, tensions, strains)
+            by_strains, self._others = by_strains + of_actuators, self._others | others
         return motors, by_strains
 
     def by_numbers(self, change: ModelChange) -> FloatArray:
         """Derivatives of the outputs by the parameters of a change of the model, shape (N, L, P)."""
         at, total = self._at, np.zeros((*self.virtual.shape[:2], change.n_parameters))
-        found = self._others | self._of_actuators
+        found: dict[str, FloatArray | None] = dict(self._others)
         if "placements" in change.by_number:
             found["placements"] = at.tree.at_placements(self._by_twist)
+        if "masses" in change.by_number:
+            found["masses"] = at.tree.by_masses(self._twists)
         if not change.by_number.keys().isdisjoint(("stiffness", "rest", "moments")):
             found |= at.springs.slopes(self.virtual)
         if at.slopes is not None and at.actuators is not None:
             found |= self._of_held_directions(at.actuators)
-        for name in found.keys() & change.by_number.keys():
-            total += change.along(name, found[name])
+        for name, rows in found.items():
+            if rows is not None:
+                total += change.along(name, rows)
         if "frames" in change.by_number:
             frames = change.by_number["frames"].reshape(-1, 6, change.n_parameters)
-            moved = {name: found[f"frame {name}"] for name in at.states.loads if f"frame {name}" in found}
-            total += sum(rows @ frames[at.model.frame_id(name)] for name, rows in moved.items())
+            for name, rows in at.tree.by_frames(self._twists).items():
+                total += rows @ frames[at.model.frame_id(name)]
             if self._outputs.pose is not None:
                 total += self._of_frame @ frames[at.model.frame_id(self._outputs.frame)]
         return total
 
     def by_loads(self) -> dict[str, FloatArray]:
         """Derivatives of the outputs by the wrench at each frame, shape (N, L, 6), and by gravity, "", shape (N, L, 3)."""
-        return {name: self._others[f"wrench {name}" if name else "gravity"] for name in self._at.states.loads}
+        return self._at.tree.by_loads(self._twists)
+
+    def by_base(self) -> FloatArray:
+        """Derivatives of the outputs by a motion of the base (position, then rotation) while loads stay, shape (N, L, 6)."""
+        tree, total = self._at.tree, np.zeros((*self.virtual.shape[:2], 6))
+        total += self._by_twist[..., tree.topology.parents < 0, :].sum(axis=-2)
+        if self._outputs.pose is not None and tree.frame(self._outputs.frame)[0] < 0:
+            total += self._of_frame
+        return total
 
     def _of_held_directions(self, actuators: ActuatorStates) -> dict[str, FloatArray]:
-        """By the numbers that tell which strains lengths hold: sums of more lengths than needed, and the names of the rest."""
+        """By the numbers that tell which sums of strains more lengths than needed hold."""
         at = self._at
         inverse = np.linalg.pinv(at.numbers["held_slopes"])
         missed = at.numbers["path_rest"] + actuators.changes - at.inputs
         sums = at.states.actuator_loads[:, at.n_joint_motors :] @ inverse
         felt = self._weights[..., at.n_joint_motors :] - actuators.arms(self.virtual)
         slopes = sums[:, None, :, None] * felt[..., None, :] + (self._lengths @ inverse)[..., None] * missed[:, None, None]
-        if self._outputs.springs is None:
-            return {"held_slopes": slopes}
-        return {"held_slopes": slopes, "elastic": self._outputs.springs[..., None] * at.strains[:, None, None]}
+        return {"held_slopes": slopes}
 
 
 @lru_cache(maxsize=64)

@@ -125,6 +125,11 @@ class Load:
         share = np.repeat([1.0, factor], 3)
         return Load({name: share * value for name, value in self.wrenches.items()}, self.gravity)
 
+    def turned(self, rotation: FloatArray) -> Load:
+        """Return the load turned by a rotation matrix, shape (3, 3), acting at the same frames."""
+        gravity = None if self.gravity is None else tuple((rotation @ self.gravity).tolist())
+        return Load({name: (rotation @ one.reshape(2, 3).T).T.ravel() for name, one in self.wrenches.items()}, gravity)
+
     def plus(self, frame: str, wrench: FloatArray) -> Load:
         """Return the load with one more wrench, shape (6,) [N, N m], at a frame."""
         return Load({**self.wrenches, frame: self.wrenches.get(frame, 0.0) + wrench}, self.gravity)

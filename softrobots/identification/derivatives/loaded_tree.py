@@ -25,10 +25,14 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.soft_model import SoftModel
 
 _SKEW = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=np.float64)
+_IDENTITY = np.eye(4)
+_MANY = 2000  # numbers, above which NumPy's cross product is faster
 
 
 def cross(a: FloatArray, b: FloatArray) -> FloatArray:
     """Cross product of vectors of shapes (..., 3) that broadcast."""
+    if a.size + b.size > _MANY:
+        return np.cross(a, b)
     return np.asarray(((a @ _SKEW).reshape(*a.shape, 3) @ b[..., None])[..., 0])
 
 
@@ -43,8 +47,8 @@ class Topology(NamedTuple):
     """1 where the joint of the column is the joint of the row or beyond it, else 0, shape (n, n)."""
     axes: FloatArray
     """Twist of each joint in its own frame, shape (n, 6)."""
-    slides: FloatArray
-    """Which joints slide, shape (n,)."""
+    motions: FloatArray
+    """Factors of sin(q), 1 - cos(q) and q in the motion of each joint beyond the identity, shape (3, n, 4, 4)."""
 
 
 @lru_cache(maxsize=64)
@@ -63,7 +67,11 @@ def topology(model: SoftModel) -> Topology:
     columns = pin.computeJointJacobians(rigid, data, pin.neutral(rigid)) if n else np.zeros((6, 0))
     columns = np.asarray(columns).reshape(6, n)
     axes = np.array([data.oMi[i + 1].actInv(pin.Motion(columns[:, i])).vector for i in range(n)]).reshape(n, 6)
-    return Topology(tuple(jumps), parents, beyond, axes, np.linalg.norm(axes[:, :3], axis=1) > 0.5)
+    motions = np.zeros((3, n, 4, 4))
+    motions[0, :, :3, :3] = (axes[:, 3:] @ _SKEW).reshape(n, 3, 3)
+    motions[1] = motions[0] @ motions[0]
+    motions[2, :, :3, 3] = axes[:, :3]  # a joint turns or slides
+    return Topology(tuple(jumps), parents, beyond, axes, motions)
 
 
 class LoadedTree:
@@ -82,7 +90,8 @@ class LoadedTree:
         """
         self.topology = tree = topology(model)
         self._model, self._numbers = model, numbers
-        self.rotation, self.position = _placed(tree, numbers["placements"], joints)
+        placed = _placed(tree, numbers["placements"], joints)
+        self.rotation, self.position = placed[..., :3], placed[..., 3]
         self.axes = np.zeros((*joints.shape, 6))
         """World twist of each joint, at the origin, shape (N, n, 6)."""
         self.axes[..., 3:] = (self.rotation @ tree.axes[:, 3:, None])[..., 0]
@@ -133,40 +142,61 @@ class LoadedTree:
             pull, turn = pull @ self.rotation[:, body], turn @ self.rotation[:, body]
         return slopes, np.concatenate([pull, turn + cross(local, pull)], axis=-1)
 
-    def work_slopes(self, rates: FloatArray) -> tuple[FloatArray, dict[str, FloatArray]]:
-        """Derivatives of the virtual work by twists of what is from each joint on, and by numbers and loads.
+    def twists(self, rates: FloatArray) -> FloatArray:
+        """Twists of the bodies, at the origin, shape (N, L, n, 6), at rates of the joints, shape (N, L, n)."""
+        return np.asarray(self.topology.beyond.T @ (rates[..., None] * self.axes[:, None]))
 
-        Args:
-            rates: Virtual rates of the joints, shape (N, L, n).
-
-        Returns:
-            By twists, shape (N, L, n, 6), and by `masses`, `frames` (twists at their joint, for each loaded frame by name),
-            wrenches by name of the frame with "wrench " before it, and `gravity`, each shape (N, L, ...).
-        """
-        tree, moving = self.topology, rates[..., None] * self.axes[:, None]
-        twists = tree.beyond.T @ moving
-        before, force, moment = twists - moving, self._force[:, None], self._moment[:, None]
-        carried, others = np.zeros((*twists.shape[:-1], 3)), {}
+    def work_slopes(self, rates: FloatArray, twists: FloatArray) -> FloatArray:
+        """Derivatives of the virtual work by the twist of what is from each joint on, shape (N, L, n, 6)."""
+        carried = np.zeros((*twists.shape[:-1], 3))
         if self._gravity is not None:
-            pull, spin = self._gravity[:, None, None], twists[..., 3:]
-            shifts = self._mass * twists[..., :3] + cross(spin, self._first[:, None])
-            carried += cross(shifts, pull)
-            others["gravity"] = shifts.sum(axis=-2)
-            slopes = (cross(pull, spin)[..., None, :] @ self.rotation[:, None])[..., 0, :]
-            heights = ((twists[..., :3] + cross(spin, self.position[:, None])) * pull).sum(-1, keepdims=True)
-            others["masses"] = np.concatenate([heights, slopes], axis=-1)
-        for frame, body, local, point, wrench in self._wrenches:
-            twist = twists[:, :, body] if body >= 0 else np.zeros((*rates.shape[:2], 6))
-            spin, speed = twist[..., 3:], twist[..., :3] + cross(twist[..., 3:], point[:, None])
-            others[f"wrench {frame}"] = np.concatenate([speed, spin], axis=-1)
+            carried += cross(self._shifts(twists), self._gravity[:, None, None])
+        for _, body, _, point, wrench in self._wrenches:
             if body >= 0:
-                carried[:, :, body] += cross(speed, wrench[:, None, :3]) + cross(spin, wrench[:, None, 3:])
-                shift = cross(np.broadcast_to(wrench[:, None, :3], spin.shape), spin) @ self.rotation[:, body]
-                others[f"frame {frame}"] = np.concatenate([shift, cross(local, shift)], axis=-1)
+                speed = self._speed(twists, body, point)
+                carried[:, :, body] += cross(speed[..., :3], wrench[:, None, :3]) + cross(speed[..., 3:], wrench[:, None, 3:])
+        before, force = twists - rates[..., None] * self.axes[:, None], self._force[:, None]
         by_twist = np.zeros_like(twists)
         by_twist[..., :3] = cross(force, before[..., 3:])
-        by_twist[..., 3:] = tree.beyond @ carried - cross(before[..., :3], force) - cross(before[..., 3:], moment)
-        return by_twist, others
+        by_twist[..., 3:] = self.topology.beyond @ carried - cross(before[..., :3], force)
+        by_twist[..., 3:] -= cross(before[..., 3:], self._moment[:, None])
+        return by_twist
+
+    def by_loads(self, twists: FloatArray) -> dict[str, FloatArray]:
+        """Derivatives of the virtual work by the wrench at each frame, (N, L, 6), and by gravity, "", (N, L, 3)."""
+        found = {frame: self._speed(twists, body, point) for frame, body, _, point, _ in self._wrenches}
+        return found if self._gravity is None else found | {"": self._shifts(twists).sum(axis=-2)}
+
+    def by_masses(self, twists: FloatArray) -> FloatArray | None:
+        """Derivatives of the virtual work by mass and first moment of each body, shape (N, L, n, 4); None if weightless."""
+        if self._gravity is None:
+            return None
+        pull = self._gravity[:, None, None]
+        aside = cross(pull, twists[..., 3:])
+        heights = (twists[..., :3] * pull + aside * self.position[:, None]).sum(-1, keepdims=True)
+        return np.concatenate([heights, (aside[..., None, :] @ self.rotation[:, None])[..., 0, :]], axis=-1)
+
+    def by_frames(self, twists: FloatArray) -> dict[str, FloatArray]:
+        """Derivatives of the virtual work by twists of the loaded frames in their joints, shape (N, L, 6)."""
+        found = {}
+        for frame, body, local, _, wrench in self._wrenches:
+            if body >= 0:
+                spin = twists[:, :, body, 3:]
+                shift = cross(np.broadcast_to(wrench[:, None, :3], spin.shape), spin) @ self.rotation[:, body]
+                found[frame] = np.concatenate([shift, cross(local, shift)], axis=-1)
+        return found
+
+    def _shifts(self, twists: FloatArray) -> FloatArray:
+        """Mass of each body times the velocity of its centre, shape (N, L, n, 3)."""
+        return np.asarray(self._mass * twists[..., :3] + cross(twists[..., 3:], self._first[:, None]))
+
+    def _speed(self, twists: FloatArray, body: int, point: FloatArray) -> FloatArray:
+        """Velocity of a point of a body, and its rate of rotation, shape (N, L, 6)."""
+        if body < 0:
+            return np.zeros((*twists.shape[:2], 6))
+        speed = twists[:, :, body].copy()
+        speed[..., :3] += cross(speed[..., 3:], point[:, None])
+        return speed
 
     def at_joints(self, by_twist: FloatArray) -> FloatArray:
         """Derivatives by joint positions from those by twists, shape (N, L, n)."""
@@ -183,15 +213,14 @@ class LoadedTree:
         return local.reshape(by_twist.shape)
 
 
-def _placed(tree: Topology, placements: FloatArray, joints: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Rotation, shape (N, n, 3, 3), and position, shape (N, n, 3), of each joint in the world."""
-    turns = np.where(tree.slides, 0.0, joints)[..., None, None]
-    skewed = (tree.axes[:, 3:] @ _SKEW).reshape(-1, 3, 3)
-    local = np.eye(3) + np.sin(turns) * skewed + (1.0 - np.cos(turns)) * (skewed @ skewed)
-    rotation, shifts = placements[:, :, :3] @ local, placements[:, :, :3] @ tree.axes[:, :3, None]
-    position = placements[:, :, 3] + shifts[..., 0] * joints[..., None]
+def _placed(tree: Topology, placements: FloatArray, joints: FloatArray) -> FloatArray:
+    """Placement of each joint in the world, shape (N, n, 3, 4)."""
+    sine, rest, way = (one[..., None, None] for one in (np.sin(joints), 1.0 - np.cos(joints), joints))
+    moved = _IDENTITY + sine * tree.motions[0] + rest * tree.motions[1] + way * tree.motions[2]
+    placed = placements @ moved
     for moving, ancestors in tree.jumps:
-        carrier = rotation[:, ancestors]
-        position[:, moving] = (carrier @ position[:, moving][..., None])[..., 0] + position[:, ancestors]
-        rotation[:, moving] = carrier @ rotation[:, moving]
-    return rotation, position
+        carrier, carried = placed[:, ancestors], placed[:, moving]
+        carried = carrier[..., :3] @ carried
+        carried[..., 3] += carrier[..., 3]
+        placed[:, moving] = carried
+    return np.asarray(placed)

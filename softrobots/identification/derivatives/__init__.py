@@ -1,0 +1,1 @@
+"""Parts of the derivatives of equilibria: joints under loads, springs, actuators, frequencies."""
