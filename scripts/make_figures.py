@@ -24,6 +24,14 @@ from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.view.browser import take_picture
 from softrobots.view.figures import canvas, equilibria, inflated_link, motions, vibrations
 from studies.gallery.actuator_plots import actuator_kinds, dry_friction
+from studies.gallery.your_robot import (
+    your_robot_ellipses,
+    your_robot_poses,
+    your_robot_predicted,
+    your_robot_residuals,
+    your_robot_sets,
+    your_robot_values,
+)
 from studies.motion import examples
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
@@ -222,6 +230,12 @@ FIGURES: dict[str, Callable[[], Any]] = {
         motion_energies,
         motion_turn,
         motion_gust,
+        your_robot_residuals,
+        your_robot_values,
+        your_robot_ellipses,
+        your_robot_predicted,
+        your_robot_sets,
+        your_robot_poses,
     )
 }
 """Plots by the name of their file."""

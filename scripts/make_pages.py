@@ -22,6 +22,7 @@ PAGES = {
     "ur5_bench": "ur5_bench",
     "motion_release": "released_arm",
     "motion_gust": "helix_in_a_gust",
+    "your_robot": "your_robot",
 }
 """Name of each page, and its exhibit."""
 

@@ -24,6 +24,7 @@ PICTURES = (
     "helix_actuator",
     "ur5_bench",
     "ur5_with_soft_arm",
+    "your_robot",
 )
 """Exhibits of which there is a picture."""
 

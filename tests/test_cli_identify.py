@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import csv
 import dataclasses
+import importlib.util
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -62,7 +63,9 @@ def test_a_folder_holds_the_fit_and_a_robot_for_other_commands(folder: Path, tol
     assert answer["validation"]["errors"]["positions.tip"]["root_mean_square"] < 1e-7
     assert np.shape(answer["covariance"]) == (4, 4)
     names = ["report.txt", "identification.json", "identification.npz", "predictions.csv", "robot.yaml"]
-    assert [Path(file).name for file in answer["files"]] == names
+    pictures = [f"{name}.png" for name in ("residuals", "predicted", "values", "correlation", "ellipses")]
+    drawn = [*pictures, "page.html"] if importlib.util.find_spec("matplotlib") else []
+    assert [Path(file).name for file in answer["files"]] == [*names, *drawn]
     assert json.loads((folder / "fit" / "identification.json").read_text(encoding="utf-8")) == {
         key: value for key, value in answer.items() if key != "files"
     }

@@ -100,7 +100,7 @@ PAGES = {
         (
             *_top("sensitivity", "Sensitivity", "Measurements", "identify", "Identification"),
             *_top("cross_validate", "CrossValidation", "informative_poses", "InformativePoses"),
-            "softrobots.identification.measurement_columns.read_columns",
+            *("softrobots.identification.parameters", "softrobots.identification.measurement_columns.read_columns"),
         ),
     ),
     "inflated_beam": ApiPage("inflated_beam", "One inflated link as a beam.", _top("inflated_beam")),

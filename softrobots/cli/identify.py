@@ -14,7 +14,7 @@ from softrobots.cli.options.robot_parameters import name_of, write_robot
 from softrobots.cli.reports.answers import add_json, plain, print_answer
 from softrobots.cli.reports.identification_report import identification_answer, identification_lines, prediction_table
 from softrobots.core.checks import positive_integer
-from softrobots.core.errors import ParameterError
+from softrobots.core.errors import MissingDependency, ParameterError, ViewerError
 from softrobots.core.files import csv_text, new_file, write_text
 from softrobots.core.result_file import save_result
 from softrobots.identification.cross_validation import CrossValidation, cross_validate
@@ -24,6 +24,10 @@ from softrobots.identification.identify import LOSSES, identify
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.suspicions import doubtful_sizes
 from softrobots.model.soft_model import SoftModel
+from softrobots.view.figures.canvas import write_png
+from softrobots.view.figures.experiments import cross_validation
+from softrobots.view.figures.identifications import identification_figures
+from softrobots.view.identification_page import IdentificationPage
 
 _EXAMPLES = """examples:
   softrobots identify poses.csv --robot inflatable_arm --columns columns.yaml --fit stiffness,hinge_offset -o fit/
@@ -34,7 +38,8 @@ _EXAMPLES = """examples:
   softrobots identify poses.csv --robot pcc_arm --fit young_modulus --fit segment[*].young_modulus --families 'day[0-9]'
 """
 
-_FILES = ("report.txt", "identification.json", "identification.npz", "predictions.csv", "robot.yaml")
+_FILES = ("report.txt", "identification.json", "identification.npz", "predictions.csv", "robot.yaml", "page.html")
+_PICTURES = ("residuals", "predicted", "values", "correlation", "ellipses", "cross_validation")
 
 
 def add_parser(subparsers: Any) -> None:
@@ -77,7 +82,7 @@ def add_parser(subparsers: Any) -> None:
         "error on what was not seen (each label is one)"
     )
     parser.add_argument("--families", metavar="REGEX", help=help_text)
-    help_text = f"folder for {', '.join(_FILES)}; robot.yaml is a robot for every other command (not saved)"
+    help_text = f"folder for {', '.join(_FILES)} and pictures; robot.yaml is a robot for every other command (not saved)"
     parser.add_argument("-o", "--output", type=Path, metavar="FOLDER", help=help_text)
     parser.add_argument("--overwrite", action="store_true", help="allow files to be replaced")
     add_json(parser)
@@ -91,7 +96,7 @@ def run(arguments: argparse.Namespace) -> bool:
     if len(priors) < len(arguments.prior):
         raise ParameterError("--prior", [name for name, _ in arguments.prior], "given once for each parameter")
     if arguments.output is not None:
-        for name in _FILES:
+        for name in (*_FILES, *(f"{picture}.png" for picture in _PICTURES)):
             new_file(arguments.output / name, overwrite=arguments.overwrite)
     model = statics_model_of(arguments)
     rows = Measurements.from_csv(arguments.data, arguments.columns)
@@ -112,7 +117,7 @@ def run(arguments: argparse.Namespace) -> bool:
             raise
         raise ParameterError("--fit", error.value, error.requirement) from error
     answer, lines = identification_answer(found, compared), identification_lines(found, compared)
-    files = [] if arguments.output is None else _write(arguments, found, answer, lines)
+    files = [] if arguments.output is None else _write(arguments, found, compared, answer, lines)
     if found.robot is not None and any(file.name == "robot.yaml" for file in files):
         lines += ["", f"as a robot: softrobots solve {arguments.output / 'robot.yaml'}"]
         others = [one.name for one in found.parameters if one.place.kind != "field"]
@@ -145,8 +150,14 @@ def _compare(
     return cross_validate(model, seen, sets, arguments.families, progress=True, **options)
 
 
-def _write(arguments: argparse.Namespace, found: Identification, answer: dict[str, Any], lines: list[str]) -> list[Path]:
-    """Write the files of a fit."""
+def _write(
+    arguments: argparse.Namespace,
+    found: Identification,
+    compared: CrossValidation | None,
+    answer: dict[str, Any],
+    lines: list[str],
+) -> list[Path]:
+    """Write the files of a fit; without matplotlib no pictures."""
     folder, overwrite = arguments.output, arguments.overwrite
     files = [
         write_text(folder / "report.txt", "\n".join(lines) + "\n", overwrite=overwrite),
@@ -157,4 +168,12 @@ def _write(arguments: argparse.Namespace, found: Identification, answer: dict[st
     name = None if found.robot is None else name_of(found.robot)
     if name is not None:
         files.append(write_robot(folder / "robot.yaml", name, found.robot, overwrite=overwrite))
+    try:
+        figures = identification_figures(found) | ({} if compared is None else {"cross_validation": cross_validation(compared)})
+        files += [write_png(figure, folder / f"{key}.png", overwrite=overwrite) for key, figure in figures.items()]
+        if any(key.startswith(("positions.", "poses.")) for key in found.residuals):
+            with IdentificationPage(found) as page:
+                files.append(page.write_html(folder / "page.html", title="Measured and predicted poses", overwrite=overwrite))
+    except (MissingDependency, ViewerError) as error:
+        warnings.warn(f"not all is drawn: {error}", stacklevel=1)
     return files

@@ -20,6 +20,7 @@ from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
 from softrobots.statics.trajectory import Trajectory, follow_trajectory
 from softrobots.view.viewer import Viewer, view
+from studies.gallery.your_robot import measured_poses
 from studies.motion.examples import gust, release
 from studies.ur5.bench import UR5Bench
 from studies.ur5.bench_run import push_link
@@ -238,6 +239,7 @@ EXHIBITS = {
     "ur5_bench": Exhibit(characterisation_bench, "UR5 pushes an inflated link at 30 kPa", 0.8),
     "released_arm": Exhibit(lambda: in_slow_motion(release(), 0.5), "The sagging arm is let go, at half speed", 0.06),
     "helix_in_a_gust": Exhibit(lambda: in_slow_motion(gust(), 0.5), "A helical tube in a gust, at half speed", 0.1),
+    "your_robot": Exhibit(measured_poses, "A fitted arm in its measured poses (synthetic)", 25.5 / 60),
     "ur5_with_soft_arm": Exhibit(ur5_with_soft_arm, "UR5 with a soft arm, 1 kg at its tip"),
 }
 """The scenes by name."""
