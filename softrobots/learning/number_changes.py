@@ -1,7 +1,6 @@
-r"""Numbers of the compiled code of a robot at given parameters, and their derivatives by the parameters.
+"""Numbers of the compiled code of a robot at given parameters, and their derivatives by the parameters.
 
-Derivatives are central differences of the numbers of robots with other values, at :math:`p \pm h` with `h` of 1e-5 of the
-parameter, exact to 1e-10; at a bound they are one-sided, of second order. They are taken once for each new value of the
+Derivatives are differences, see `softrobots.identification.model_change`. They are taken once for each new value of the
 parameters, not for each case.
 """
 
@@ -14,11 +13,9 @@ import numpy as np
 from softrobots.compiled.run.responses import Responses
 from softrobots.compiled.trace.numbers import NumberInputs, numbers_of
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import ParameterError, SoftRobotsError
+from softrobots.core.errors import ParameterError
+from softrobots.identification.model_change import differences
 from softrobots.identification.parameters import ParameterSet
-
-_STEP = 1e-5  # relative to the parameter; of a parameter that is zero, absolute
-_STENCILS = (((-1.0, -0.5), (1.0, 0.5)), ((0.0, -1.5), (1.0, 2.0), (2.0, -0.5)), ((0.0, 1.5), (-1.0, -2.0), (-2.0, 0.5)))
 
 
 class NumberChanges:
@@ -70,23 +67,12 @@ class NumberChanges:
 
     def _slopes(self, values: tuple[float, ...]) -> FloatArray:
         """Return the derivatives of the numbers by the parameters, shape (n, P); zero of those that do not change the model."""
-        slopes = np.zeros((len(numbers_of(self._chain)), len(values)))
-        for column in np.flatnonzero(self._parameters.of_model):
-            for stencil in _STENCILS:
-                try:
-                    slopes[:, column] = self._difference(np.array(values), int(column), stencil)
-                except SoftRobotsError:  # beyond a bound
-                    if stencil is _STENCILS[-1]:
-                        raise
-                else:
-                    break
-        return slopes
+        base = {"numbers": self._numbers(values)}
+        slopes = np.zeros((base["numbers"].size, len(values)))
+        for place in np.flatnonzero(self._parameters.of_model).tolist():
 
-    def _difference(self, values: FloatArray, column: int, stencil: tuple[tuple[float, float], ...]) -> FloatArray:
-        step = _STEP * (abs(values[column]) or 1.0)
-        total = np.zeros(len(numbers_of(self._chain)))
-        for place, factor in stencil:
-            other = values.copy()
-            other[column] += place * step
-            total += self._numbers(tuple(other.tolist())) * (factor / step)
-        return total
+            def at(value: float, place: int = place) -> dict[str, FloatArray]:
+                return {"numbers": self._numbers((*values[:place], value, *values[place + 1 :]))}
+
+            slopes[:, place] = differences(self._parameters.parameters[place], values[place], base, at)["numbers"]
+        return slopes
