@@ -10,6 +10,10 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.identification.parameters import ParameterSet
+from softrobots.model.friction_coordinates import memory_of, remembering
+from softrobots.statics.elastostatics import balanced_state
+from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.loads import Load
 from tests.support.law_robots import ROBOTS, Case, cases, model
 from tests.support.laws import law
 
@@ -160,6 +164,37 @@ def test_an_estimated_force_follows_the_parameters() -> None:
         # estimates leave 1e-10 of the torques, which the step enlarges
         np.testing.assert_allclose(slopes.force[:, place], expected, rtol=0.0, atol=1e-5 * np.abs(expected).max() + 1e-5)
     assert np.abs(slopes.motor_torques).max() < 1e-9 * np.abs(torques).max() / 1e-3
+
+
+@pytest.mark.study
+def test_friction_slips_or_sticks_while_parameters_change() -> None:
+    """From rest, which changes with its parameters, and after a step, of which the memory stays; two segments slip or stick."""
+    names = ("segment[*].bending_friction", "segment[1].bending_stiffness", "linear_density", "motor[2]")
+    robot = sr.PccArm(segment_lengths=(0.3, 0.25), elastic_sections=2, kind="tension", bending_friction=(0.15, 0.02))
+    parameters = ParameterSet.of(robot, names)
+    model, motors = parameters.present, np.array([5.0, 20.0, 0.0, 10.0, 0.0, 3.0])
+    first = sr.solve_equilibrium(model, motors, gravity=sr.EARTH_GRAVITY, **TOLERANCE)
+    second = sr.solve_equilibrium(model, 0.9 * motors, gravity=sr.EARTH_GRAVITY, previous=first, **TOLERANCE)
+    for found in (first, second):
+        slopes = sr.sensitivity(model, found, parameters)
+        for place, value in enumerate(parameters.values.tolist()):
+            step = 1e-5 * (abs(value) or 10.0)
+
+            def tip(number: int, place: int = place, step: float = step, found: sr.Equilibrium = found) -> np.ndarray:
+                shift = np.zeros(len(parameters.names))
+                shift[place] = number * step
+                other = parameters.model(parameters.values + shift)
+                if found is second:
+                    other = remembering(other, memory_of(second.model))
+                moved = found.q_motors + np.array([0.0, shift[-1], 0.0, 0.0, 0.0, 0.0])
+                load = Load.of(other, gravity=sr.EARTH_GRAVITY)
+                state = balanced_state(other, moved, load, found.q_springs, tolerance=1e-13)
+                assert state is not None
+                return np.array(frame_placement(other, state.q, other.tip).translation)
+
+            expected = (8.0 * (tip(1) - tip(-1)) - tip(2) + tip(-2)) / (12.0 * step)
+            size = max(float(np.abs(expected).max()), 1e-4 / (abs(value) or 10.0))
+            np.testing.assert_allclose(slopes.tip_position[:, place], expected, rtol=0.0, atol=1e-7 * size)
 
 
 def test_a_marker_moves_with_its_frame_and_its_offset() -> None:

@@ -13,11 +13,12 @@ from softrobots.core.checks import FloatArray, finite_array, instance_of, read_o
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.vibration import VibrationModes
 from softrobots.identification.derivatives.frequency_derivatives import frequency_slopes
+from softrobots.identification.friction_derivatives import friction_loads
 from softrobots.identification.model_change import ModelChange, model_change, numbers_of
 from softrobots.identification.parameter_names import LOADS
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
-from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.friction_coordinates import memory_of
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_placement
@@ -158,7 +159,28 @@ class Sensitivity:
 
     def _at_constant_load(self, outputs: Outputs) -> tuple[FloatArray, FloatArray]:
         """Derivatives of rows of outputs by the parameters, shape (L, P), and by the force at the tip, shape (L, 3)."""
-        rows, parameters, tip = AdjointRows(self._at, outputs), self.parameters, self._tip
+        rows = AdjointRows(self._at, outputs)
+        slopes, by_force = self._without_friction(rows)
+        if self.equilibrium.model.structure.friction is not None:
+            slopes = slopes + rows.virtual[0] @ self._friction
+        return slopes, by_force
+
+    @cached_property
+    def _friction(self) -> FloatArray:
+        """Change of the load of friction on the strains at the same strains, shape (n_strains, P).
+
+        What friction remembers stays, but for a robot that nothing has moved: that remembers its shape at rest.
+        """
+        friction, memory = self.equilibrium.model.structure.friction, memory_of(self.equilibrium.model)
+        change = _change(self.parameters)
+        if friction is not None and not np.array_equal(memory.bending, friction.untouched.bending):
+            change = change._replace(by_number={name: one for name, one in change.by_number.items() if name != "rest"})
+        loads = friction_loads(self._at, memory.bending[None], change, lambda rows: self._without_friction(rows)[0][None])
+        return np.asarray(loads[0])
+
+    def _without_friction(self, rows: AdjointRows) -> tuple[FloatArray, FloatArray]:
+        """The same while the load of friction stays."""
+        parameters, tip = self.parameters, self._tip
         slopes = rows.by_numbers(_change(parameters))[0]
         by_load = {name: one[0] for name, one in rows.by_loads().items()} if self._loaded else {}
         by_kind = {"motor": rows.by_actuators[0], "offset": rows.by_actuators[0], "base": None, "gravity": by_load.get("")}
@@ -203,7 +225,8 @@ def sensitivity(
 
     By implicit differentiation at the state (`softrobots.identification.residual_derivatives`): exact to 1e-8, without solving
     for another equilibrium. `Sensitivity.gradient` costs about two equilibria, whatever the number of parameters. At a knee
-    (the end of a plateau, a tendon that goes slack) they are the derivatives of the side that the state is on.
+    (the end of a plateau, a tendon that goes slack) they are the derivatives of the side that the state is on. Friction of
+    sections that bend slips or sticks as it does, and what it remembers stays.
 
     Args:
         model: The robot.
@@ -215,14 +238,18 @@ def sensitivity(
         The derivatives. They are cheap to compute and are not saved.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model, its robot has dry friction, a name is that of several parts
-            whose values differ, or the structure of the robot changes with a parameter.
+        ParameterError: If the equilibrium belongs to another model, its robot has friction of guides, or friction of segments
+            whose muscle lengths are given, a name is that of several parts whose values differ, or the structure of the robot
+            changes with a parameter.
         NameNotFound: If there is no such parameter; with all that there are.
         NeutralEquilibrium: If the tangent stiffness is singular: a neutral equilibrium has no derivative.
     """
     estimate, at = (equilibrium, equilibrium.equilibrium) if isinstance(equilibrium, LoadEstimate) else (None, equilibrium)
     check_same_model(model, at)
-    check_frictionless(model, "derivatives by parameters")
+    friction = model.structure.friction
+    if friction is not None and (friction.guided or model.structure.muscle_lengths is not None):
+        requirement = "a robot without friction of guides, and without friction of segments whose muscle lengths are given"
+        raise ParameterError("model", model.pinocchio.name, f"{requirement}, for derivatives by parameters")
     if not isinstance(parameters, ParameterSet):
         names = (parameters,) if isinstance(parameters, str) else tuple(parameters)
         parameters = _named(model, model.robot is not None, names)
