@@ -35,6 +35,7 @@ from softrobots.dynamics.damping import damping_time_from_decrement, measured_de
 from softrobots.dynamics.input_shaping import InputShaper, ShapedTrajectory, input_shaper, residual_vibration, shape_input
 from softrobots.dynamics.linear_model import LinearModel, linearize
 from softrobots.dynamics.motion import Motion, MotionState
+from softrobots.dynamics.ring_down import RingDown, ring_down
 from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.identification.cross_validation import CrossValidation, cross_validate
@@ -105,6 +106,7 @@ __all__ = [
     "ParameterError",
     "Path3D",
     "PccArm",
+    "RingDown",
     "Route",
     "SelfIntersection",
     "Sensitivity",
@@ -147,6 +149,7 @@ __all__ = [
     "quintic",
     "read_waypoints",
     "residual_vibration",
+    "ring_down",
     "sample_workspace",
     "save_csv",
     "save_result",

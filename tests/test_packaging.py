@@ -37,12 +37,12 @@ EARTH_GRAVITY PD ROBOTS AssumedStiffnessWarning ClosedLoop ClusterError CrossVal
 EquilibriumBranch EquilibriumNotFound FileFormatError HelixTube Identification IkSolution ImposedDisplacement InflatableArm
 InformativePoses InputShaper LinearModel LinkLimits LoadEstimate LoadNotFound Measurements MissingDependency Motion
 MotionState NameNotFound NeutralEquilibrium NoCriticalLoad NotConverged OutputError OutputExists ParameterError Path3D PccArm
-Route SelfIntersection Sensitivity ShapedTrajectory SoftModel SoftRobotsError SpringGroup Stability StraightTube
+RingDown Route SelfIntersection Sensitivity ShapedTrajectory SoftModel SoftRobotsError SpringGroup Stability StraightTube
 TargetUnreachable TendonArm Trajectory VibrationModes Viewer ViewerError Workspace __version__ compliance constant_curvature
 critical_load cross_validate damping_time_from_decrement distributed_force elastostatic_jacobian estimate_load export
 follow_trajectory grown_coordinates helix identify inflated_beam informative_poses input_shaper linearize load_model
-load_result measured_decay mount post_buckling_branches quintic read_waypoints residual_vibration sample_workspace save_csv
-save_result sensitivity shape_input simulate solve_equilibrium solve_ik solve_imposed_displacement straight_line
+load_result measured_decay mount post_buckling_branches quintic read_waypoints residual_vibration ring_down sample_workspace
+save_csv save_result sensitivity shape_input simulate solve_equilibrium solve_ik solve_imposed_displacement straight_line
 vibration_modes view waypoints with_springs
 """
 """What users import from `softrobots`: a name is added here on purpose, and none disappears unnoticed."""

@@ -18,13 +18,12 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_number
-from softrobots.core.errors import NotConverged, ParameterError
+from softrobots.dynamics.ring_down import ring_down
 from softrobots.model.assembly import velocity_indices
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.stability import mass_matrix
 
 _SHARING = ((0, 3), (1, 4), (5, 5), (2, 2))  # of the six joints of a section, those of bend_x, bend_y, twist, stretch
-_LEAST_SAMPLES = 8
 
 
 class Decay(NamedTuple):
@@ -95,10 +94,10 @@ def damping_time_from_decrement(decrement: Any, frequency: Any) -> float:
 
 
 def measured_decay(time: Any, signal: Any) -> Decay:
-    r"""Decrement and frequency of a measured free vibration, e.g. the tip's height after the robot is plucked.
+    """Decrement and frequency of a measured free vibration of one mode, e.g. the tip's height after the robot is plucked.
 
-    The best fit of :math:`c + e^{-\sigma t} (a \cos \omega t + b \sin \omega t)` by least squares, which needs no peaks and
-    takes an offset; one mode is to dominate. `damping_time_from_decrement(*measured_decay(time, signal))` is the damping time.
+    `damping_time_from_decrement(*measured_decay(time, signal))` is the damping time. For several modes, several signals or
+    standard deviations see `ring_down`.
 
     Args:
         time: Times, ascending, at least 8 that span a period or more, shape (n,) [s].
@@ -111,40 +110,11 @@ def measured_decay(time: Any, signal: Any) -> Decay:
         ParameterError: If shapes differ, times do not ascend, or the signal is constant.
         NotConverged: If no decaying vibration fits the signal.
     """
-    from scipy.optimize import least_squares
-
     t = finite_array("time", time, (None,), "s")
-    x = finite_array("signal", signal, (len(t),))
-    if len(t) < _LEAST_SAMPLES or not np.all(np.diff(t) > 0.0):
-        raise ParameterError("time", time, f"at least {_LEAST_SAMPLES} ascending times [s]")
-    if not np.ptp(x) > 1e-12 * float(np.abs(x).max()):
-        raise ParameterError("signal", signal, "one that changes")
-    span = float(t[-1] - t[0])
-    moments, scale = (t - t[0]) / span, float(np.ptp(x))
-
-    def missing(shape: FloatArray) -> FloatArray:
-        decay = np.exp(-shape[0] * moments)
-        basis = np.column_stack([np.ones(len(t)), decay * np.cos(shape[1] * moments), decay * np.sin(shape[1] * moments)])
-        return np.asarray(basis @ np.linalg.lstsq(basis, x / scale, rcond=None)[0] - x / scale)
-
-    grid = np.linspace(0.0, 1.0, 8 * len(t))
-    even = np.interp(grid, moments, x / scale)
-    power = np.abs(np.fft.rfft((even - even.mean()) * np.hanning(len(grid)), 4 * len(grid)))
-    angular = 0.5 * math.pi * max(int(power.argmax()), 4)
-    fits = [least_squares(missing, [start, angular], x_scale=[1.0, angular], xtol=1e-14, ftol=1e-14) for start in (1.0, 6.0)]
-    best = min(fits, key=lambda fit: fit.cost)
-    rate, angular = float(best.x[0]), abs(float(best.x[1]))
-    explained = 1.0 - 2.0 * best.cost / float(np.sum((x / scale - (x / scale).mean()) ** 2))
-    decay = Decay(2.0 * math.pi * max(rate, 0.0) / angular, angular / (2.0 * math.pi * span))
-    if not (best.success and rate >= -1e-9 and angular > math.pi and explained > 0.5):
-        raise NotConverged(
-            f"no decaying vibration of a period or more fits the signal (decay {rate / span:.3g} 1/s, "
-            f"{angular / span:.3g} rad/s, {explained:.0%} of its variance)",
-            best=decay,
-            residual=math.sqrt(2.0 * best.cost) * scale,
-            iterations=int(best.nfev),
-        )
-    return decay
+    found = ring_down(t, finite_array("signal", signal, (len(t),)))
+    ratio = float(found.damping_ratios[0])
+    slow = math.sqrt(1.0 - ratio**2)
+    return Decay(2.0 * math.pi * ratio / slow, float(found.frequencies[0]) * slow)
 
 
 def _of_the_file(model: SoftModel) -> FloatArray:
