@@ -18,7 +18,7 @@ from softrobots.core.files import make_folder
 from softrobots.view.figures import canvas
 from studies.measured_arm.fit_tables import compared_table, fit_table
 from studies.measured_arm.fitted import command, compare, fit
-from studies.measured_arm.pictures import by_axis, by_movement
+from studies.measured_arm.pictures import drawn
 from studies.shared.checkout import CHECKOUT
 from studies.shared.recorded_run import check_page, write_record
 
@@ -50,8 +50,8 @@ def run(arguments: argparse.Namespace) -> None:
     if arguments.docs is not None:
         if compared:
             images = make_folder(arguments.docs / "docs" / "images")
-            for picture, draw in (("axes", by_axis), ("movements", by_movement)):
-                canvas.write_png(draw(compared), images / f"fitted_{picture}.png", overwrite=True)
+            for picture, figure in drawn(compared).items():
+                canvas.write_png(figure, images / f"fitted_{picture}.png", overwrite=True)
         typed = f"python scripts/measured_arm_fit.py{' --compare' if arguments.compare else ''}"
         write_record(arguments.docs, name, table, record, command=typed, page=PAGE)
 

@@ -45,6 +45,8 @@ def pages() -> list[str]:
         "input_shaping",
         "controllers",
         "measured_arm",
+        "measured_families",
+        "measured_fit",
         "long_proofs",
     ],
 )

@@ -37,7 +37,7 @@ def _errors(record: Mapping[str, Any]) -> str:
     cells = [millimetres(sets[name][key]) for key in ("offset_m", "posed_m") for name in NAMES]
     lines += [line([f"fitted, {record['n_parameters']} parameters", *cells]), line(PUBLISHED)]
     seconds = f"{record['wall_s']:.0f} s ({record['cpu_s']:.0f} s of one core)"
-    end = f"The fit: {record['message']}, {record['steps']} steps, {seconds}, pictures and tables not counted."
+    end = f"The fit: {record['message']}, {record['steps']} steps, {seconds}, the prediction of validation included."
     told = [f"- {text}" for text in record["unidentifiable"]]
     return "\n".join([*lines, "", end, *(["", "What the rows tell badly:", "", *told] if told else [])])
 

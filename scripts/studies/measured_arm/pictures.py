@@ -39,8 +39,8 @@ def pictures(compared: Sequence[Compared], plain: Sequence[Compared], floor: Flo
     }
 
 
-def by_axis(compared: Sequence[Compared]) -> Any:
-    """Predicted over measured, an axis a panel."""
+def by_axis(compared: Sequence[Compared], told: str = "Nominal robot, nothing fitted here but the pose of the base") -> Any:
+    """Predicted over measured, an axis a panel; the title says what is `told`."""
     figure = canvas.new_figure((13.0, 4.6))
     for number, axes in enumerate(figure.subplots(1, 3)):
         both = np.concatenate([np.stack([one.recording.tips[:, number], one.posed[:, number]]) for one in compared], axis=1)
@@ -61,9 +61,7 @@ def by_axis(compared: Sequence[Compared]) -> Any:
         axes.set(xlabel=f"measured {'xyz'[number]} [mm]", ylabel=f"predicted {'xyz'[number]} [mm]", xlim=ends, ylim=ends)
         axes.set_aspect("equal")
         canvas.grid_and_legend(axes, fontsize=8, loc="upper left", markerscale=2)
-    figure.suptitle(
-        "Nominal robot, nothing fitted here but the pose of the base; root mean square of the difference", fontsize=11
-    )
+    figure.suptitle(f"{told}; root mean square of the difference", fontsize=11)
     return figure
 
 
@@ -95,10 +93,19 @@ def percent(values: FloatArray, bins: FloatArray) -> dict[str, FloatArray]:
     return {"x": np.minimum(MM * values, bins[-1] - 0.1), "bins": bins, "weights": np.full(len(values), 100.0 / len(values))}
 
 
+def drawn(compared: Sequence[Compared]) -> dict[str, Any]:
+    """Pictures of a fit by name."""
+    return {"axes": by_axis(compared, "Robot fitted to train; validation was not seen"), "movements": by_movement(compared)}
+
+
 def by_movement(compared: Sequence[Compared]) -> Any:
     """Errors by family of movements."""
     figure = canvas.new_figure((8.5, 3.9))
-    _boxes(figure.subplots(), compared)
+    axes = figure.subplots()
+    _boxes(axes, compared)
+    for place, one in enumerate(compared):
+        axes.plot([], [], color=canvas.COLOURS[place], lw=6, alpha=0.7, label=TITLES[one.recording.name].partition(":")[0])
+    canvas.grid_and_legend(axes, fontsize=8, loc="lower right")
     return figure
 
 
