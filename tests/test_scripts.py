@@ -230,3 +230,27 @@ def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
     plain = sr.load_model(arm.urdf, springs=dict.fromkeys(arm.spring_joints) | {"spring_1_up": 100.0}, motors=arm.motor_joints)
     with pytest.raises(sr.ParameterError, match="with inflated links"):
         trajectories.link_moments(sr.follow_trajectory(plain, path.positions[:2]))
+
+
+def test_identification_errors_counts_intervals_and_chooses_poses(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture
+) -> None:
+    """Small: two fits of each noise, five of 60 candidates. The record has the tables that are printed."""
+    monkeypatch.setattr("studies.identification.choice.CANDIDATES", 60)
+    monkeypatch.setattr("studies.identification.choice.NUMBERS", (5,))
+    names = ("identification_coverage", "informative_poses")
+    (tmp_path / "docs").mkdir()
+    page = tmp_path / "docs" / "validation.md"
+    page.write_text("".join(f"<!-- {name}:begin -->\n<!-- {name}:end -->\n" for name in names))
+    assert run_script("identification_errors", ["--fits", "2", "--seed", "3", "--docs", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    found, chosen = (json.loads((tmp_path / "docs" / "validation" / f"{name}.json").read_text()) for name in names)
+    assert all(table.strip() in page.read_text() for table in printed.split("\n\n"))
+    assert found["command"] == "python scripts/identification_errors.py --fits 2 --seed 3"
+    for rows in found["noises"].values():
+        assert len(rows) == 9
+        for row in rows:  # a fit of 120 rows is near the truth
+            assert row["mean"] == pytest.approx(row["truth"], rel=0.5, abs=0.002)
+            assert {row["rows"], row["blocks"]} <= {0.0, 0.5, 1.0}
+    assert 0.1 < chosen["rows"][0]["random"] < 1.0
+    assert run_script("identification_errors", ["--fits", "1"]) == 2

@@ -1,0 +1,1 @@
+"""Errors of parameters identified from noisy measurements of synthetic robots."""
