@@ -173,7 +173,7 @@ def values(result: Identification) -> Any:
     handles += [axes.barh(0, 0, color="0.87", label="prior, 2 std")] * bool(result.priors)
     figure.legend(handles=handles, loc="outside lower center", ncols=len(handles), fontsize=10)
     names = [plain_words(name) for name in result.names]
-    axes.set(xlim=(-0.08, 2.0), ylim=(len(names) - 0.4, -0.6), xticks=[], yticks=range(len(names)), yticklabels=names)
+    axes.set(xlim=(-0.08, 1.08), ylim=(len(names) - 0.4, -0.6), xticks=[], yticks=range(len(names)), yticklabels=names)
     axes.spines[["top", "right", "bottom"]].set_visible(False)
     return figure
 
