@@ -400,6 +400,33 @@ def test_one_row_tells_three_combinations_and_the_rest_keeps_its_start() -> None
         sr.identify(ARM, sr.Measurements(np.zeros((2, 3)), tip_position=[[np.nan] * 3, [1.0] * 3], mask=[True, False]), names)
 
 
+def test_a_search_does_not_run_off_along_what_noise_hides() -> None:
+    """Six noisy tips prefer an infinite torsional stiffness by less than noise: it stays near the start, and is named."""
+    random, model = np.random.default_rng(1), sr.load_model(PCC)
+    commanded, forces = random.uniform(0.0, 12.0, (6, 6)), random.normal(0.0, 0.5, (6, 3))
+    every = [sr.solve_equilibrium(model, *one, gravity=GRAVITY) for one in zip(commanded, forces, strict=True)]
+    tips = np.array([one.tip_position for one in every]) + 1e-3 * random.standard_normal((6, 3))
+    data = sr.Measurements(commanded, force=forces, gravity=GRAVITY, tip_position=tips, std=1e-3)
+    found = sr.identify(PCC, data, ("torsional_stiffness", "bending_stiffness"))
+    start, (low, high) = PCC.torsional_stiffness[0], found.intervals["torsional_stiffness"]
+    assert start / 3.0 < found.values["torsional_stiffness"] < 3.0 * start
+    assert low == 0.0
+    assert start < high < 100.0 * start
+    assert [text for text in found.unidentifiable if text.startswith("torsional_stiffness: almost no effect")]
+    assert found.history.cost[-1] < found.history.cost.min() + 2.0  # two standard deviations
+
+
+def test_a_length_that_may_be_zero_has_an_interval_from_zero_on() -> None:
+    """A hinge at 2 mm, told to some 50 mm: the interval of its logarithm would reach from 1e-5 to 22 m."""
+    true = replace(ARM, hinge_offset=0.002)
+    commanded, forces = rows(8, (0.8, 0.8, 0.8), 5.0)
+    data = measured(ParameterSet.of(true, "stiffness"), [170.0], commanded, forces, seen=("tip_position",))
+    noisy = np.array(data.measured["positions.tip"]) + 2e-3 * np.random.default_rng(0).standard_normal((8, 3))
+    again = sr.Measurements(commanded, force=forces, gravity=GRAVITY, tip_position=noisy, std=2e-3)
+    low, high = sr.identify(replace(true, hinge_offset=0.04), again, ("stiffness", "hinge_offset")).intervals["hinge_offset"]
+    assert 0.0 <= low < 0.002 < high < 0.3
+
+
 def test_rows_without_an_equilibrium_are_named() -> None:
     arm = sr.InflatableArm(stiffness=170.0, max_moment=10.0)
     data = sr.Measurements(np.zeros((3, 3)), wrench=[[0.0] * 6, [0, 0, 0, 0, 90.0, 0], [0.0] * 6], tip_position=np.ones((3, 3)))

@@ -1,14 +1,14 @@
 """One least-squares fit: rows in standard deviations, their Jacobian by the fitted coordinates, and the search.
 
 The fitted coordinates are the parameters, and the logarithms of positive ones. Rows are what was measured minus what is
-predicted; then what is known before, priors; then the combinations that change no prediction, which keep their start.
+predicted; then what is known before, priors; then the combinations that keep their start: those that change no prediction,
+and those that noise hides, where a search runs off along them without a gain that is more than noise.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from typing import Any, NamedTuple
+from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
@@ -16,17 +16,19 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
 from softrobots.identification.prediction import Prediction, Predictor
 from softrobots.identification.uncertainty import UNDETERMINED, scaled_directions
+from softrobots.identification.weights import Prior, Weights
 
 INTERRUPTED = "interrupted: the best values up to then"
 """Message of a fit that Ctrl-C has ended."""
 
 _ROUNDS = 6  # most searches, each with derivatives of the model's numbers of where the last one ended
 _FARTHEST = 100.0  # factor by which a search changes a positive parameter at most; the next one goes on
+_RUN_OFF = np.log(10.0)  # change along a combination with a standard deviation above 100 % beyond which a search runs off
+_GAIN = 2.0  # of the cost, in variances, that makes up for that: two standard deviations
 _NEAR = 0.01  # change of the parameters, relative, up to which those derivatives are good enough on the way
 _SAME = 1e-8  # share of the cost that a further step may gain at the end: 0.005 standard errors with 1000 rows
 _SAME_RUBBING = 1e-5  # the same of a robot with dry friction: where rows begin to slip, the cost has kinks
 _ROUNDING = 1e-22  # share of the first cost that is rounding
-_LEAST = 1e-9  # of an unknown standard deviation, relative to the differences at the start
 
 
 def rho(loss: str, z: FloatArray) -> FloatArray:
@@ -44,78 +46,6 @@ def rho(loss: str, z: FloatArray) -> FloatArray:
     return np.array([z, one, 0.0 * z])
 
 
-@dataclass(frozen=True)
-class Weights:
-    """Standard deviations of what was measured, and what counts."""
-
-    std: Mapping[str, FloatArray]
-    """By quantity, shape (n, k)."""
-    counted: Mapping[str, Any]
-    """Which numbers are there, in rows that count, shape (n, k), truth values."""
-    given: frozenset[str]
-    """Quantities whose standard deviations are known."""
-
-    @classmethod
-    def of(cls, given: Mapping[str, FloatArray], differences: Mapping[str, FloatArray], rows: Any) -> Weights:
-        """Take them as given by quantity; for others the root mean square of measured minus predicted at the start.
-
-        Args:
-            given: Standard deviations that are known.
-            differences: Measured minus predicted at the start, by quantity, shape (n, k).
-            rows: Rows that count, shape (n,).
-        """
-        counted = {key: np.isfinite(values) & rows[:, None] for key, values in differences.items()}
-        start = cls(
-            {key: given.get(key, np.ones_like(values)) for key, values in differences.items()}, counted, frozenset(given)
-        )
-        return start._rescaled(differences, lambda numbers: float(np.sqrt(np.mean(numbers**2))) or 1.0)
-
-    def every(self, step: int) -> Weights:
-        """Return those of every row whose number is a multiple of a step."""
-        std, counted = ({key: one[::step] for key, one in part.items()} for part in (self.std, self.counted))
-        return Weights(std, counted, self.given)
-
-    def estimated(self, differences: Mapping[str, FloatArray]) -> Weights:
-        """Return weights in which the robust spread of residuals is the standard deviation that is not known."""
-        return self._rescaled(differences, lambda numbers: max(1.4826 * float(np.median(np.abs(numbers))), _LEAST))
-
-    def _rescaled(self, differences: Mapping[str, FloatArray], spread: Any) -> Weights:
-        std = {key: np.array(values) for key, values in self.std.items()}
-        for key in std.keys() - self.given:
-            for columns in [slice(0, 3), slice(3, 6)] if key.startswith("poses.") else [slice(None)]:
-                numbers = (differences[key] / std[key])[:, columns][self.counted[key][:, columns]]
-                std[key][:, columns] *= spread(numbers) if numbers.size else 1.0
-        return Weights(std, self.counted, self.given)
-
-    @property
-    def known(self) -> bool:
-        """Whether all standard deviations are known."""
-        return self.given >= self.std.keys()
-
-    def flat(self, by_quantity: Mapping[str, FloatArray]) -> FloatArray:
-        """Return what counts of differences (n, k), or of their derivatives (n, k, P), in standard deviations, rows first."""
-        parts = []
-        for key, values in by_quantity.items():
-            std = self.std[key] if values.ndim == 2 else self.std[key][..., None]
-            parts.append((values / std)[self.counted[key]])
-        return np.concatenate(parts)
-
-    def rows(self) -> Any:
-        """Return the measured row of each of those numbers, shape (rows,)."""
-        return np.concatenate([np.nonzero(counted)[0] for counted in self.counted.values()])
-
-
-class Prior(NamedTuple):
-    """What is known of parameters before."""
-
-    places: Any
-    """Numbers of the parameters, from 0, shape (k,)."""
-    mean: FloatArray
-    """Means, shape (k,)."""
-    std: FloatArray
-    """Standard deviations, shape (k,)."""
-
-
 class Fit:
     """A search from one start; `message`, `course` and `values` tell how it ended."""
 
@@ -124,7 +54,7 @@ class Fit:
         self.predictor, self.weights, self.prior, self.loss, self._steps = predictor, weights, prior, loss, steps
         self._logarithmic = predictor.parameters.logarithmic
         self._same = _SAME if predictor.parameters.present.structure.friction is None else _SAME_RUBBING
-        self._held = np.zeros((0, len(self._logarithmic)))
+        self._held = self._weak = np.zeros((0, len(self._logarithmic)))
         self._count = self._linear = 0
         self._known: tuple[Any, FloatArray, FloatArray] | None = None
         self.course: list[tuple[float, FloatArray]] = []
@@ -148,35 +78,48 @@ class Fit:
         Raises:
             SoftRobotsError: If the robot refuses these values, or rows have no equilibrium there; names them.
         """
-        from scipy.optimize import least_squares
-
         x = self._coordinates(start)
-        self._anchor = self._middle = x
+        self._anchor = self._weak_anchor = self._middle = x
         self._refresh(x)
         self._held = self._null(x)
-        limits = self.predictor.parameters
-        with np.errstate(divide="ignore"):
-            bounds = [self._coordinates(np.maximum(ends, np.where(self._logarithmic, 0.0, -np.inf)))
-                      for ends in (limits.lower, limits.upper)]  # fmt: skip
         try:
-            for _ in range(_ROUNDS if most else 0):
-                left, self._middle = max(1, most - len(self.course)), x
-                found = least_squares(
-                    self._rows, x, self._jacobian, bounds, x_scale="jac", loss=self._loss, ftol=self._same, xtol=1e-9,
-                    gtol=1e-12, max_nfev=left,
-                )  # fmt: skip
-                x, self.message = found.x, "converged" if found.status > 0 else f"not converged in {most} steps"
-                if self._exact_at is not x:
-                    self._refresh(x)
-                held = self._null(x)
-                if found.status == 0 or (len(held) == len(self._held) and self._is_lowest(x)):
-                    break
-                self._held = held
+            x = self._search(x, most)
+            weak, least = self._run_off(x), self._cost(x)
+            if len(weak):
+                far, self._weak = x, weak
+                x = self._search(x - weak.T @ (weak @ (x - self._anchor)), most)
+                if self._cost(x) > least + _GAIN * self._variance(far):
+                    self._weak_anchor = far
+                    x = self._search(far, most)
             self._record(x)
         except KeyboardInterrupt:
             self.message = INTERRUPTED
             self.course = self.course or [(np.inf, start)]
             self._refresh(self._coordinates(self.values))
+
+    def _search(self, x: FloatArray, most: int) -> FloatArray:
+        """Search from given coordinates until a step gains nothing, or runs off; return where it ends, shape (P,)."""
+        from scipy.optimize import least_squares
+
+        limits = self.predictor.parameters
+        with np.errstate(divide="ignore"):
+            bounds = [self._coordinates(np.maximum(ends, np.where(self._logarithmic, 0.0, -np.inf)))
+                      for ends in (limits.lower, limits.upper)]  # fmt: skip
+        for _ in range(_ROUNDS if most else 0):
+            left, self._middle = max(1, most - len(self.course)), x
+            found = least_squares(
+                self._rows, x, self._jacobian, bounds, x_scale="jac", loss=self._loss, ftol=self._same, xtol=1e-9,
+                gtol=1e-12, max_nfev=left,
+            )  # fmt: skip
+            x, self.message = found.x, "converged" if found.status > 0 else f"not converged in {most} steps"
+            if self._exact_at is not x:
+                self._refresh(x)
+            held = self._null(x)
+            lowest = len(held) == len(self._held) and self._is_lowest(x)
+            if found.status == 0 or lowest or (not len(self._weak) and len(self._run_off(x))):
+                break
+            self._held = held
+        return x
 
     def at_end(self) -> tuple[Prediction, FloatArray, FloatArray]:
         """Return the prediction at the end, the residuals of what counts, (rows,), and their Jacobian, (rows, P)."""
@@ -191,13 +134,16 @@ class Fit:
     @property
     def held(self) -> int:
         """Number of combinations of parameters that kept their start."""
-        return len(self._held)
+        return len(self._held) + len(self._weak)
 
     @property
     def information(self) -> FloatArray:
         """One over the square of the standard deviations of the priors, in the fitted coordinates, shape (P,)."""
-        found: FloatArray = np.zeros(len(self._logarithmic))
-        found[self.prior.places] = (self._rates(self._coordinates(self.values))[self.prior.places] / self.prior.std) ** 2
+        return self._information(self._coordinates(self.values))
+
+    def _information(self, x: FloatArray) -> FloatArray:
+        found: FloatArray = np.zeros(len(x))
+        found[self.prior.places] = (self._rates(x)[self.prior.places] / self.prior.std) ** 2
         return found
 
     def _coordinates(self, values: FloatArray) -> FloatArray:
@@ -230,8 +176,8 @@ class Fit:
             return np.full(self._count, np.inf)
         data = self.weights.flat(prediction.differences())
         known = (self.prior.mean - prediction.values[self.prior.places]) / self.prior.std
-        self._count, self._linear = len(data) + len(known) + len(self._held), len(data)
-        return np.concatenate([data, known, self._held @ (x - self._anchor)])
+        self._count, self._linear = len(data) + len(known) + self.held, len(data)
+        return np.concatenate([data, known, self._held @ (x - self._anchor), self._weak @ (x - self._weak_anchor)])
 
     def _jacobian(self, x: FloatArray) -> FloatArray:
         if self._moved(x) > _NEAR:
@@ -244,10 +190,24 @@ class Fit:
         places = self.prior.places
         known = np.zeros((len(places), len(x)))
         known[np.arange(len(places)), places] = -self._rates(x)[places] / self.prior.std
-        return np.concatenate([self._slopes(x), known, self._held])
+        return np.concatenate([self._slopes(x), known, self._held, self._weak])
 
     def _record(self, x: FloatArray) -> None:
-        self.course.append((0.5 * float(self._loss(self._rows(x) ** 2)[0].sum()), self._values(x)))
+        self.course.append((self._cost(x), self._values(x)))
+
+    def _cost(self, x: FloatArray) -> float:
+        return 0.5 * float(self._loss(self._rows(x) ** 2)[0].sum())
+
+    def _variance(self, x: FloatArray) -> float:
+        """Variance of rows: 1 where standard deviations are known, else from the cost."""
+        return 1.0 if self.weights.known else 2.0 * self._cost(x) / max(self._linear - len(x), 1)
+
+    def _run_off(self, x: FloatArray) -> FloatArray:
+        """Combinations that noise hides along which a search has gone far, in rows of norm 1, shape (k, P)."""
+        stacked = np.vstack([self._slopes(x), np.diag(np.sqrt(self._information(x)))])
+        _, singular, right = np.linalg.svd(stacked * self._logarithmic)
+        hidden = right[singular < np.sqrt(self._variance(x))]
+        return np.asarray(hidden[np.abs(hidden @ ((x - self._anchor) * self._logarithmic)) > _RUN_OFF])
 
     def _is_lowest(self, x: FloatArray) -> bool:
         """Whether a step of Gauss and Newton with exact derivatives would lower the cost by no more than rounding does."""
@@ -275,8 +235,7 @@ class Fit:
 
     def _null(self, x: FloatArray) -> FloatArray:
         """Rows that hold the combinations that neither measurements nor priors tell, shape (k, P)."""
-        slopes, information = self._slopes(x), np.zeros(len(x))
-        information[self.prior.places] = (self._rates(x)[self.prior.places] / self.prior.std) ** 2
-        scale, singular, right = scaled_directions(slopes, information)
+        slopes = self._slopes(x)
+        scale, singular, right = scaled_directions(slopes, self._information(x))
         lost = right[singular <= UNDETERMINED * singular.max(initial=0.0)] * np.where(scale > 0.0, scale, 1.0)
         return np.asarray(np.linalg.qr(lost.T)[0].T * max(float(np.linalg.norm(slopes)), 1.0))

@@ -84,7 +84,7 @@ def find_gauges(jacobian: Any, parameters: Sequence[Parameter], *, prior: Any = 
         members, steps = _smallest(short, known, sizes, left, change)
         effects = _effects(short, known, members, steps)
         order = np.argsort(-np.round(effects / max(float(effects.max()), 1e-300), 6), kind="stable")  # equal ones as they come
-        found.append(_told(rows, sizes, parameters, [members[place] for place in order], steps[order]))
+        found.append(_told(rows, sizes, parameters, [members[place] for place in order], steps[order], left))
         left.remove(found[-1].members[0])
     return tuple(found)
 
@@ -124,12 +124,16 @@ def _effects(rows: FloatArray, prior: FloatArray, some: list[int], change: Float
     return np.asarray(np.abs(change) * np.sqrt(np.sum(rows[:, some] ** 2, axis=0) + prior[some]))
 
 
-def _told(rows: FloatArray, sizes: FloatArray, parameters: Sequence[Parameter], members: list[int], steps: FloatArray) -> Gauge:
-    """The combination of some parameters in words."""
+def _told(
+    rows: FloatArray, sizes: FloatArray, parameters: Sequence[Parameter], members: list[int], steps: FloatArray, left: list[int]
+) -> Gauge:
+    """The combination of some of the parameters that are left in words."""
     steps = steps * np.copysign(_STEP / np.max(np.abs(steps) / sizes[members]), steps[0])
     chosen = [parameters[member] for member in members]
     change = float(np.max(np.abs(rows[:, members] @ steps), initial=0.0))
-    kind = _kind(chosen, steps)
+    kind = _kind(
+        chosen, steps, not any(re.search(r"\b(N|Pa)\b", parameters[other].unit) for other in left if other not in members)
+    )
     names = [one.name for one in chosen]
     raised = [_amounts(chosen, steps, sign) for sign in (1.0, -1.0)]
     moves = " and ".join(f"{verb} {words}" for verb, words in zip(("raising", "lowering"), raised, strict=True) if words)
@@ -148,12 +152,12 @@ def _amounts(chosen: Sequence[Parameter], steps: FloatArray, sign: float) -> str
     return " and ".join(f"{' and '.join(names)} by {amount}" for amount, names in together.items())
 
 
-def _kind(chosen: Sequence[Parameter], steps: FloatArray) -> str:
-    """The kind of a combination, from the names and units of its members and how they change."""
+def _kind(chosen: Sequence[Parameter], steps: FloatArray, whole: bool) -> str:
+    """The kind of a combination, from the names and units of its members, how they change, and whether no other is a force."""
     names = [one.name for one in chosen]
     scales = [1.0 if one.logarithmic else one.value or np.inf for one in chosen]
     relative = steps / np.array(scales)
-    forces = all(re.search(r"\b(N|Pa|kg)\b", one.unit) for one in chosen)
+    forces = whole and all(re.search(r"\b(N|Pa|kg)\b", one.unit) for one in chosen)
     if len(chosen) > 1 and all(re.search(r"pretension|preload|slack|motor.*offset", name) for name in names):
         return "preloads"
     if forces and np.ptp(relative) <= _SAME * np.max(np.abs(relative)) and np.all(relative != 0.0):

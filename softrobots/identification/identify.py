@@ -4,7 +4,9 @@ The fit minimises :math:`\sum_i \rho(r_i^2) + \sum_j ((m_j - p_j) / s_j)^2` with
 loss :math:`\rho` and priors of mean `m` and standard deviation `s`, by SciPy's trust region method (Branch, Coleman and Li
 1999) within the bounds of the physics. Positive parameters are fitted by their logarithm. A step to values that the robot
 refuses, or where a row has no equilibrium, is refused. A combination of parameters that changes no prediction keeps the
-value that it starts with; one that the measurements tell badly is fitted. Both are told in words (see `gauges`).
+value that it starts with, and so does one of logarithms along which the search runs off, by a factor of 10 or more, where its
+standard deviation is above 100 % and the fit gains less than two standard deviations; others that the measurements tell badly
+are fitted. All are told in words (see `gauges`).
 """
 
 from __future__ import annotations
@@ -20,11 +22,12 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_array, positive_integer
 from softrobots.core.errors import NameNotFound, ParameterError, SoftRobotsError
 from softrobots.core.progress import with_progress
-from softrobots.identification.fit import INTERRUPTED, Fit, Prior, Weights
+from softrobots.identification.fit import INTERRUPTED, Fit
 from softrobots.identification.identification import Identification, identification_of
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import QUANTITIES, Predictor
+from softrobots.identification.weights import Prior, Weights
 
 LOSSES = ("linear", "soft_l1", "huber", "cauchy", "arctan")
 """Losses of `identify`."""

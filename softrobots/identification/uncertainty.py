@@ -24,6 +24,7 @@ UNDETERMINED = 1e-7
 is not determined: well above the error of a Jacobian by differences (1e-9), well below what noise leaves useful."""
 
 _PARTAKES = 1e-4  # component of a parameter in an undetermined combination of norm 1 above which it is undetermined, too
+_TOLD = np.array([0.5, 1.0])  # standard error of a logarithm up to which it tells the lower, and the upper end of an interval
 _ALONE = 1e-9  # 1 minus the leverage below which a row, or a block, determines a combination alone
 
 
@@ -55,6 +56,9 @@ class Uncertainty:
     def intervals(self, values: Any, logarithmic: Any = False, confidence: float = CONFIDENCE) -> FloatArray:
         """Return lower and upper ends of the intervals of the parameters by Student's t, shape (P, 2).
 
+        Of logarithmic parameters they are those of the logarithm, but where it is told badly, and the parameter may as well be
+        zero, the lower end (and beyond a standard error of 1 the upper one, too) is that of the parameter itself, or zero.
+
         Args:
             values: Values of the parameters (not their logarithms), shape (P,).
             logarithmic: Which of them are fitted by their logarithm, shape (P,) or one for all.
@@ -63,10 +67,11 @@ class Uncertainty:
         from scipy.special import stdtrit  # here, because importing it takes longer than all of this package
 
         margin = stdtrit(self.freedoms, 0.5 + 0.5 * confidence) * self.std[:, None] * np.array([-1.0, 1.0])
-        middle = np.asarray(values, dtype=np.float64)[:, None]
-        with np.errstate(over="ignore", invalid="ignore"):  # exp of an infinite margin; 0 times that is not chosen
-            ends = np.where(np.reshape(logarithmic, (-1, 1)), middle * np.exp(margin), middle + margin)
-        return np.asarray(ends)
+        middle, ratio = np.asarray(values, dtype=np.float64)[:, None], np.reshape(logarithmic, (-1, 1))
+        told = ratio & (self.std[:, None] <= _TOLD)
+        ends = middle + np.where(ratio & (middle != 0.0), np.abs(middle), 1.0) * margin
+        ends = np.where(ratio, np.maximum(ends, 0.0), ends)
+        return np.asarray(np.where(told, middle * np.exp(np.where(told, margin, 0.0)), ends))
 
 
 def uncertainty_from_rows(jacobian: Any, residuals: Any, *, prior: Any = 0.0, std_known: bool = True) -> Uncertainty:
