@@ -6,6 +6,7 @@ import csv
 import dataclasses
 import importlib.util
 import json
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -64,8 +65,8 @@ def test_a_folder_holds_the_fit_and_a_robot_for_other_commands(folder: Path, tol
     assert np.shape(answer["covariance"]) == (4, 4)
     names = ["report.txt", "identification.json", "identification.npz", "predictions.csv", "robot.yaml"]
     pictures = [f"{name}.png" for name in ("residuals", "predicted", "values", "correlation", "ellipses")]
-    drawn = [*pictures, "page.html"] if importlib.util.find_spec("matplotlib") else []
-    assert [Path(file).name for file in answer["files"]] == [*names, *drawn]
+    drawn = pictures if importlib.util.find_spec("matplotlib") else []
+    assert [Path(file).name for file in answer["files"]] == [*names, *drawn, "page.html"]
     assert json.loads((folder / "fit" / "identification.json").read_text(encoding="utf-8")) == {
         key: value for key, value in answer.items() if key != "files"
     }
@@ -98,6 +99,16 @@ def test_a_folder_holds_the_fit_and_a_robot_for_other_commands(folder: Path, tol
     status, out, err = told(*WORDS, *FIT, "-o", "fit", "--overwrite")
     assert status == 0, err
     assert "not in robot.yaml: base.position.x, base.position.y, base.position.z\n" in out
+
+
+@pytest.mark.filterwarnings("default::UserWarning")
+def test_without_matplotlib_all_but_the_pictures_is_written(folder: Path, told: Told, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
+    status, _, err = told(*WORDS, "--fit", "stiffness,base.position", "-o", "fit")
+    assert status == 0
+    assert "not all is drawn" in err
+    assert "softrobots[plot]" in err
+    assert {file.suffix for file in (folder / "fit").iterdir()} == {".txt", ".json", ".npz", ".csv", ".yaml", ".html"}
 
 
 def test_sets_of_parameters_are_compared_on_families_left_out(folder: Path, told: Told) -> None:

@@ -168,12 +168,23 @@ def _write(
     name = None if found.robot is None else name_of(found.robot)
     if name is not None:
         files.append(write_robot(folder / "robot.yaml", name, found.robot, overwrite=overwrite))
-    try:
-        figures = identification_figures(found) | ({} if compared is None else {"cross_validation": cross_validation(compared)})
-        files += [write_png(figure, folder / f"{key}.png", overwrite=overwrite) for key, figure in figures.items()]
-        if any(key.startswith(("positions.", "poses.")) for key in found.residuals):
-            with IdentificationPage(found) as page:
-                files.append(page.write_html(folder / "page.html", title="Measured and predicted poses", overwrite=overwrite))
-    except (MissingDependency, ViewerError) as error:
-        warnings.warn(f"not all is drawn: {error}", stacklevel=1)
+    for draw in (_pictures, _page):
+        try:
+            files += draw(folder, found, compared, overwrite)
+        except (MissingDependency, ViewerError) as error:
+            warnings.warn(f"not all is drawn: {error}", stacklevel=1)
     return files
+
+
+def _pictures(folder: Path, found: Identification, compared: CrossValidation | None, overwrite: bool) -> list[Path]:
+    """Write the figures of a fit."""
+    figures = identification_figures(found) | ({} if compared is None else {"cross_validation": cross_validation(compared)})
+    return [write_png(figure, folder / f"{key}.png", overwrite=overwrite) for key, figure in figures.items()]
+
+
+def _page(folder: Path, found: Identification, compared: CrossValidation | None, overwrite: bool) -> list[Path]:
+    """Write the page of measured and predicted poses, if there are any."""
+    if not any(key.startswith(("positions.", "poses.")) for key in found.residuals):
+        return []
+    with IdentificationPage(found) as page:
+        return [page.write_html(folder / "page.html", title="Measured and predicted poses", overwrite=overwrite)]
