@@ -40,7 +40,7 @@ IN_SI = {
     "turn": 6.283185307179586, "N": 1.0, "mN": 0.001, "kN": 1000.0, "kgf": 9.80665, "lbf": 4.4482216152605, "N m": 1.0,
     "N cm": 0.01, "N mm": 0.001, "mN m": 0.001, "kg": 1.0, "g": 0.001, "lb": 0.45359237, "Pa": 1.0, "kPa": 1e3, "MPa": 1e6,
     "bar": 1e5, "mbar": 100.0, "psi": 6894.757293168361, "m/s^2": 1.0, "mm/s^2": 0.001, "Hz": 1.0,
-    "rad/s": 0.15915494309189535, "s": 1.0, "ms": 0.001, "us": 1e-6, "min": 60.0,
+    "rad/s": 0.15915494309189535, "s": 1.0, "ms": 0.001, "us": 1e-6, "min": 60.0, "1": 1.0, "%": 0.01,
 }  # fmt: skip
 """One of each unit in SI units, as the Bureau International des Poids et Mesures and NIST SP 811 print them."""
 
@@ -255,6 +255,7 @@ BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({"tip_position": TIPS, "mass": [1.0, -2.0], "gravity": (0, 0, -9.81)}, r"mass \(row 1\) = -2.0"),
     ({"tip_position": TIPS, "gravity": (0, 0)}, "gravity"),
     ({"motor_torques": np.zeros((2, 3))}, r"motor_torques = .*shape \(2, 2\)"),
+    ({"damping_ratios": [[0.0], [1.0]]}, r"damping_ratios \(row 1\) = \[1.0\].*below 1"),
     ({"frequencies": [[1.0], [0.0]]}, r"frequencies \(row 1\) = \[0.0\].*positive"),
     (pose(3, 3, 2.0), r"poses\.tip \(row 1\).*last row"),
     (pose(0, 0, -1.0), r"poses\.tip \(row 1\).*rotation matrix"),
@@ -295,6 +296,7 @@ BAD_FOR_ROBOT: list[tuple[dict[str, Any], str]] = [
     ({"wrench": {"nowhere": np.zeros((2, 6))}}, "no frame is called 'nowhere'"),
     ({"relative": True}, "not all of these are muscles with a length"),
     ({"tensions": np.ones((2, 1))}, "tensions = .*of 0 columns, one a muscle"),
+    ({"damping_ratios": np.full((2, 5), 0.1)}, "damping_ratios = .*at most 4 columns"),
     ({"frequencies": np.ones((2, 5))}, "frequencies = .*at most 4 columns"),
 ]
 
@@ -385,6 +387,7 @@ def measured(draw: st.DrawFn, n: int | None = None) -> sr.Measurements:
         arguments, std = arguments | {"poses": {"tip": poses}}, std | {"poses.tip": (0.001, 0.02)}
     if choice["torques"]:
         arguments |= {"motor_torques": rows(2, gaps), "tensions": rows(1, gaps), "frequencies": 1.0 + rows(3) ** 2}
+        arguments |= {"damping_ratios": 0.5 + 0.4 * np.tanh(rows(2, gaps))}
     if choice["labels"]:
         words = st.text(st.characters(categories=["L", "N", "P", "Zs"]), min_size=1, max_size=9).filter(str.isprintable)
         words = words.map(str.strip).filter(bool)

@@ -47,9 +47,9 @@ def add_parser(subparsers: Any) -> None:
     parser = subparsers.add_parser(
         "identify",
         help="fit parameters of a robot to measurements",
-        description="Fit parameters of a robot to measured positions, poses, torques, tensions or frequencies at rest, by "
-        "least squares with exact derivatives. Exit status 0 if the fit converges, 1 if not, 2 after bad input, 130 after "
-        "Ctrl-C, which writes what there is.",
+        description="Fit parameters of a robot to measured positions, poses, torques, tensions, frequencies or damping ratios "
+        "at rest, by least squares with exact derivatives. Exit status 0 if the fit converges, 1 if not, 2 after bad input, "
+        "130 after Ctrl-C, which writes what there is.",
         epilog=_EXAMPLES,
     )
     parser.add_argument("data", type=Path, metavar="DATA.csv", help="measured rows; the first line names the columns")

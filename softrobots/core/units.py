@@ -13,6 +13,7 @@ UNITS: dict[str, dict[str, float]] = {
     "pressure": {"Pa": 1.0, "kPa": 1e3, "MPa": 1e6, "bar": 1e5, "mbar": 1e2, "psi": 6894.757293168361},
     "acceleration": {"m/s^2": 1.0, "mm/s^2": 1e-3},
     "frequency": {"Hz": 1.0, "rad/s": 0.5 / math.pi},
+    "ratio": {"1": 1.0, "%": 0.01},
     "time": {"s": 1.0, "ms": 1e-3, "us": 1e-6, "min": 60.0},
 }
 """Factors to SI units (angles to radians, frequencies to hertz) by quantity and unit."""

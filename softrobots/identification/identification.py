@@ -19,7 +19,7 @@ from softrobots.identification.uncertainty import Uncertainty, outliers, uncerta
 from softrobots.model.soft_model import SoftModel
 
 UNITS = {"positions": "m", "motor_torques": "N m or N", "tensions": "N", "frequencies": "Hz"}
-"""Units of measured quantities; of poses m and rad."""
+"""Units of measured quantities; of poses m and rad; damping ratios have none."""
 
 
 class Comparison(NamedTuple):
@@ -28,7 +28,7 @@ class Comparison(NamedTuple):
     measurements: Measurements
     """The rows."""
     predicted: Mapping[str, FloatArray]
-    """Predictions, by the names and in the shapes of `measurements.measured`."""
+    """Predictions, by the names and in the shapes of `measurements.measured`; of vibrations NaN in rows without any."""
     residuals: Mapping[str, FloatArray]
     """Measured minus predicted by quantity, shape (n, k), of poses position and rotation vector (n, 6); NaN where missing or
     not counted."""

@@ -9,6 +9,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.identification.measurement_checks import TIP
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.loads import Load
 
 
 def frame_of(model: SoftModel, name: str, markers: Mapping[str, str]) -> str:
@@ -39,3 +40,18 @@ def wrenches_on(model: SoftModel, loads: Mapping[str, FloatArray]) -> dict[str, 
         if key != "gravity":
             total[frame] = total.get(frame, 0.0) + values
     return total
+
+
+def loads_on(model: SoftModel, loads: Mapping[str, FloatArray], rotation: FloatArray) -> dict[str, FloatArray]:
+    """Return all loads by frame, gravity by the empty name, in the axes of the robot, which stands turned by a rotation."""
+    found = {name: np.asarray(wrench) for name, wrench in wrenches_on(model, loads).items()}
+    if "gravity" in loads:
+        found[""] = loads["gravity"]
+    return {name: (load.reshape(-1, 3) @ rotation).reshape(load.shape) for name, load in found.items()}
+
+
+def load_cases(loads: Mapping[str, FloatArray], count: int) -> list[Load]:
+    """Return the loads of so many rows, from arrays by frame as `loads_on` returns them."""
+    frames = [name for name in loads if name]
+    gravities = [None] * count if "" not in loads else [tuple(one) for one in loads[""].tolist()]
+    return [Load({name: loads[name][row] for name in frames}, one) for row, one in enumerate(gravities)]

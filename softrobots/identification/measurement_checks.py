@@ -7,9 +7,12 @@ from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
+import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of
 from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.soft_model import SoftModel
 
 TIP = "tip"
 """Name that stands for the tip of the robot where it has no frame or marker of that name."""
@@ -50,7 +53,7 @@ def with_gaps(name: str, value: Any, shape: tuple[int | None, ...] | None, unit:
 
 
 def check_rows(loads: Mapping[str, FloatArray], measured: Mapping[str, FloatArray], where: Callable[[int], str]) -> None:
-    """Check masses, frequencies and rotations, and that something was measured.
+    """Check masses, frequencies, damping ratios and rotations, and that something was measured.
 
     Raises:
         ParameterError: If not; names the row.
@@ -59,6 +62,9 @@ def check_rows(loads: Mapping[str, FloatArray], measured: Mapping[str, FloatArra
         _refuse("mass", loads["mass"], loads["mass"] < 0.0, "zero or positive [kg]", where)
     if "frequencies" in measured:
         _refuse("frequencies", measured["frequencies"], measured["frequencies"] <= 0.0, "positive [Hz]", where)
+    if "damping_ratios" in measured:
+        ratios = measured["damping_ratios"]
+        _refuse("damping_ratios", ratios, (ratios < 0.0) | (ratios >= 1.0), "zero or positive, and below 1 [-]", where)
     for key, poses in measured.items():
         if key.startswith("poses."):
             turns, gaps = poses[:, :3, :3], np.isnan(poses[:, :3, :3])
@@ -69,8 +75,20 @@ def check_rows(loads: Mapping[str, FloatArray], measured: Mapping[str, FloatArra
             bad = (errors > _ROTATION) | (np.linalg.det(turns) < 0.0)
             _refuse(key, poses, bad, f"a pose with a rotation matrix, orthogonal within {_ROTATION:g}", where)
     if all(missing_in(values).all() for values in measured.values()):
-        raise ParameterError("measured", list(measured), "at least one number of positions, poses, motor_torques, tensions or "
-                             "frequencies")  # fmt: skip
+        raise ParameterError("measured", list(measured), "at least one number of positions, poses, motor_torques, tensions, "
+                             "frequencies or damping_ratios")  # fmt: skip
+
+
+def check_modes(measured: Mapping[str, FloatArray], model: SoftModel) -> None:
+    """Check that a robot has as many modes as were measured.
+
+    Raises:
+        ParameterError: If it has fewer, or dry friction.
+    """
+    for name in {"frequencies", "damping_ratios"} & measured.keys():
+        check_frictionless(model, name)
+        if measured[name].shape[1] > model.n_springs:
+            raise ParameterError(name, measured[name].shape, f"of at most {model.n_springs} columns (this is its shape)")
 
 
 def missing_in(values: FloatArray) -> Any:
@@ -78,6 +96,18 @@ def missing_in(values: FloatArray) -> Any:
     if values.ndim == 2:
         return np.isnan(values)
     return np.isnan(np.concatenate([values[:, :3, 3], values[:, :3, 0]], axis=1))
+
+
+def difference(measured: FloatArray, predicted: FloatArray) -> FloatArray:
+    """Return measured minus predicted, shape (n, k), NaN where missing.
+
+    Of poses, (n, 4, 4), it is that of positions, then the rotation vector of `R_measured R_predicted^T`.
+    """
+    if measured.ndim == 2:
+        return measured - predicted
+    turns = measured[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2)
+    angles = [pin.log3(turn) if np.isfinite(turn).all() else np.full(3, np.nan) for turn in turns]
+    return np.concatenate([measured[:, :3, 3] - predicted[:, :3, 3], np.reshape(angles, (-1, 3))], axis=1)
 
 
 def deviations_of(measured: Mapping[str, FloatArray], std: Any, where: Callable[[int], str]) -> dict[str, FloatArray]:

@@ -44,6 +44,7 @@ QUANTITIES = {
     "motor_torques": Quantity(("torque", "force"), measured=True),
     "tensions": Quantity(("force",), measured=True),
     "frequencies": Quantity(("frequency",), measured=True),
+    "damping_ratios": Quantity(("ratio",), measured=True),
 }
 """Entries of a mapping that have columns of numbers."""
 
@@ -132,7 +133,8 @@ def read_columns(columns: Any) -> Layout:
     `unit` is one for all columns, or one for each equal share of them; "SI" converts nothing. `scale` multiplies afterwards,
     e.g. -1 for an axis that is mirrored, or the radius of a pulley. `std` has the unit of the columns: a number or the name of
     a column, one for all or one each; of poses two, position and angle. The rotation of a pose is one of `ROTATIONS`, angles
-    in `angle_unit` (rad). `force`, `wrench`, `tensions`, `frequencies`, `mask` and `markers` are those of `Measurements`.
+    in `angle_unit` (rad). `force`, `wrench`, `tensions`, `frequencies`, `damping_ratios`, `mask` and `markers` are those of
+    `Measurements`.
 
     Args:
         columns: The mapping, or the path of a YAML file (JSON if its name ends with `.json`) that holds it.

@@ -20,6 +20,7 @@ from softrobots.identification.measured_robot import frame_of, wrenches_on
 from softrobots.identification.measurement_checks import (
     TIP,
     by_name,
+    check_modes,
     check_rows,
     deviations_of,
     each_row_of,
@@ -45,7 +46,7 @@ class Measurements:
     """What acted, by name: "force" (n, 3) [N], "wrench.FRAME" (n, 6) [N, N m], "mass" (n,) [kg], "gravity" (n, 3) [m/s^2]."""
     measured: Mapping[str, FloatArray]
     """What was measured, by name, NaN where missing: "positions.NAME" (n, 3) [m], "poses.NAME" (n, 4, 4), "motor_torques"
-    (n, m) [N m or N], "tensions" (n, muscles) [N], "frequencies" (n, k) [Hz]."""
+    (n, m) [N m or N], "tensions" (n, muscles) [N], "frequencies" (n, k) [Hz], "damping_ratios" (n, k)."""
     std: Mapping[str, FloatArray]
     """Standard deviations of those of which they are known, shape (n, k); of a pose (n, 6) [m, rad]."""
     labels: tuple[str, ...] | None
@@ -73,6 +74,7 @@ class Measurements:
         motor_torques: Any = None,
         tensions: Any = None,
         frequencies: Any = None,
+        damping_ratios: Any = None,
         std: Any = None,
         labels: Any = None,
         mask: Any = None,
@@ -93,7 +95,8 @@ class Measurements:
             poses: Poses by frame or marker, each shape (n, 4, 4) [m]; the rotation may be missing as a whole.
             motor_torques: Load on each actuator, with the sign of `Equilibrium.motor_torques`, shape (n, m) [N m or N].
             tensions: Tension of each muscle, shape (n, muscles) [N].
-            frequencies: Lowest natural frequencies, shape (n, k) [Hz].
+            frequencies: Lowest natural frequencies, slowest first, shape (n, k) [Hz]; e.g. of `ring_down`.
+            damping_ratios: Damping ratios of the slowest modes, shape (n, k).
             std: Standard deviations by name ("tip_position", "positions.NAME", "motor_torques", ...), or of the only quantity:
                 one number, one for each component, or arrays of rows; of a pose two, position [m] and angle [rad], or six.
             labels: A word for each row.
@@ -132,6 +135,7 @@ class Measurements:
             "motor_torques": (motor_torques, motors.shape, "N m or N"),
             "tensions": (tensions, (n, None), "N"),
             "frequencies": (frequencies, (n, None), "Hz"),
+            "damping_ratios": (damping_ratios, (n, None), "-"),
         }
         self._set("lines", None if lines is None else finite_array("lines", lines, (n,)).astype(np.int64))
         self._set("q_motors", motors)
@@ -252,8 +256,8 @@ class Measurements:
         """Check that the measurements can be those of a robot.
 
         Raises:
-            ParameterError: If it has other numbers of actuators, muscles or frequencies, pulls are given of actuators without a
-                length, or (naming the row) it cannot have such actuator coordinates.
+            ParameterError: If it has other numbers of actuators, muscles or modes, dry friction where vibrations were measured,
+                pulls are given of actuators without a length, or (naming the row) it cannot have such actuator coordinates.
             NameNotFound: If it has no such frame.
         """
         actuators = check_model(model).actuators
@@ -262,13 +266,12 @@ class Measurements:
             raise ParameterError("q_motors", self.q_motors.shape, f"of {model.n_motors} columns: {named} (this is its shape)")
         if self.relative and (len(model.muscles) < model.n_motors or set(actuators.units) != {"m"}):
             raise ParameterError("relative", True, f"False, as not all of these are muscles with a length: {named}")
-        tensions, frequencies = (self.measured.get(name) for name in ("tensions", "frequencies"))
+        tensions = self.measured.get("tensions")
         if tensions is not None and tensions.shape[1] != len(model.muscles):
             raise ParameterError(
                 "tensions", tensions.shape, f"of {len(model.muscles)} columns, one a muscle (this is its shape)"
             )
-        if frequencies is not None and frequencies.shape[1] > model.n_springs:
-            raise ParameterError("frequencies", frequencies.shape, f"of at most {model.n_springs} columns (this is its shape)")
+        check_modes(self.measured, model)
         wrenches_on(model, self.loads)
         for name in (*self.markers, *(key.partition(".")[2] for key in self.measured if "." in key)):
             frame_of(model, name, self.markers)

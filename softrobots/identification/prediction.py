@@ -11,7 +11,7 @@ or given lengths, where they are differences of the whole course.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
 from typing import NamedTuple
 
@@ -21,8 +21,10 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.identification.derivatives.loaded_tree import cross
+from softrobots.identification.derivatives.row_vibration import VIBRATION, RowVibration
 from softrobots.identification.friction_derivatives import friction_loads, slopes_of_course
-from softrobots.identification.measured_robot import frame_of, wrenches_on
+from softrobots.identification.measured_robot import frame_of, load_cases, loads_on
+from softrobots.identification.measurement_checks import difference
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
@@ -128,6 +130,20 @@ class Prediction:
                     slopes[..., number] += (by_load @ change)[..., 0]
         return slopes
 
+    @cached_property
+    def vibration(self) -> RowVibration:
+        """Modes about the rows in which something of them was measured."""
+        states = self.at.states
+        return RowVibration(self.model, states, self.predictor.cases(states.loads), self.predictor.measurements)
+
+    @cached_property
+    def vibration_slopes(self) -> dict[str, FloatArray]:
+        """Derivatives of those by the parameters, by quantity, shape (n, n_springs, P)."""
+        predictor, count = self.predictor, self.at.strains.shape
+        slopes = self.along(AdjointRows(self.at, Outputs(strains=np.tile(np.eye(count[1]), (count[0], 1, 1)))))
+        known = predictor.parameters, self.values, self.at.strains, slopes
+        return self.vibration.slopes(*known, predictor.actuator_slopes, self._turning)
+
     def _frame(self, name: str) -> str:
         return frame_of(self.model, name, self.predictor.measurements.markers)
 
@@ -167,7 +183,7 @@ class Predictor:
         self._offsets = self.actuator_slopes.copy()
         self._springs: FloatArray | None = None
         self._last: Prediction | None = None
-        self._kept: tuple[dict[str, FloatArray], list[Load]] | None = None
+        self._kept: tuple[Mapping[str, FloatArray], list[Load]] | None = None
 
     def refresh(self, values: FloatArray) -> None:
         """Differentiate the model's numbers at given values.
@@ -202,20 +218,13 @@ class Predictor:
     def _solve(self, model: SoftModel, values: FloatArray) -> tuple[States, FloatArray | None]:
         measurements, (_, turn) = self.measurements, self.parameters.base(values)
         motors = measurements.motor_coordinates(model) + self.parameters.motor_offsets(values)
-        loads = {name: np.asarray(wrench) for name, wrench in wrenches_on(model, measurements.loads).items()}
-        if "gravity" in measurements.loads:
-            loads[""] = measurements.loads["gravity"]
-        if np.any(turn):
-            rotation = np.asarray(pin.exp3(turn))
-            loads = {name: (load.reshape(-1, 3) @ rotation).reshape(load.shape) for name, load in loads.items()}
+        loads = loads_on(model, measurements.loads, np.asarray(pin.exp3(turn)))
         sliders: list[FloatArray] = []
         states = list(self._equilibria(model, motors, loads, sliders))
         lost = [measurements.where(row) for row, state in enumerate(states) if state is None]
         if lost:
             words = ", ".join(lost[:10]) + (f" and {len(lost) - 10} more" if len(lost) > 10 else "")
-            requirement = (
-                f"rows with an equilibrium at the values to start from; {words} have none: start from other values, or"
-            )
+            requirement = f"rows with an equilibrium at the values to start from; {words} have none: start from others, or"
             raise ParameterError("measurements", measurements, f"{requirement} leave them out by the mask")
         found = [state for state in states if state is not None]
         self._springs = np.array([state.q_springs for state in found])
@@ -229,7 +238,7 @@ class Predictor:
     ) -> Iterable[ElasticState | None]:
         """Search from the equilibria of the values before, then from rest or the row before; appends sliders of friction."""
         now, before = untouched(model), np.asarray(model.rest)
-        for row, load in enumerate(self._cases(loads)):
+        for row, load in enumerate(self.cases(loads)):
             state = None
             if self.in_order:
                 sliders.append(memory_of(now).bending)
@@ -239,26 +248,11 @@ class Predictor:
                 now, before = after_step(now, motors[row], state.q_springs), state.q_springs
             yield state
 
-    def _cases(self, loads: dict[str, FloatArray]) -> list[Load]:
-        """The loads of the rows, made once while they stay the same."""
+    def cases(self, loads: Mapping[str, FloatArray]) -> list[Load]:
+        """Return the loads of the rows, made once while they stay the same."""
         if self._kept is None or any(not np.array_equal(loads[name], self._kept[0][name]) for name in loads):
-            frames = [name for name in loads if name]
-            gravities = [None] * len(self.measurements) if "" not in loads else [tuple(one) for one in loads[""].tolist()]
-            rows = [Load({name: loads[name][row] for name in frames}, one) for row, one in enumerate(gravities)]
-            self._kept = loads, rows
+            self._kept = loads, load_cases(loads, len(self.measurements))
         return self._kept[1]
-
-
-def difference(measured: FloatArray, predicted: FloatArray) -> FloatArray:
-    """Return measured minus predicted, shape (n, k), NaN where missing.
-
-    Of poses, (n, 4, 4), it is that of positions, then the rotation vector of `R_measured R_predicted^T`.
-    """
-    if measured.ndim == 2:
-        return measured - predicted
-    turns = measured[:, :3, :3] @ np.swapaxes(predicted[:, :3, :3], 1, 2)
-    angles = [pin.log3(turn) if np.isfinite(turn).all() else np.full(3, np.nan) for turn in turns]
-    return np.concatenate([measured[:, :3, 3] - predicted[:, :3, 3], np.reshape(angles, (-1, 3))], axis=1)
 
 
 def _position(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
@@ -291,10 +285,16 @@ def _load(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
     )
 
 
+def _vibration(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
+    values = prediction.vibration.values(key, measured.shape[1])
+    return Seen(values, difference(measured, values), lambda: -prediction.vibration_slopes[key][:, : measured.shape[1]])
+
+
 QUANTITIES: dict[str, Callable[[Prediction, str, FloatArray], Seen]] = {
     "positions": _position,
     "poses": _pose,
     "motor_torques": _load,
     "tensions": _load,
+    **dict.fromkeys(VIBRATION, _vibration),
 }
 """What can be measured: by the first word of its name, what is predicted of it."""

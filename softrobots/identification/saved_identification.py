@@ -16,8 +16,8 @@ from softrobots.core.errors import FileFormatError
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
 from softrobots.identification.identification import Comparison, History, Identification
+from softrobots.identification.measurement_checks import difference, with_gaps
 from softrobots.identification.parameter_names import Parameter, Place
-from softrobots.identification.prediction import difference
 from softrobots.identification.uncertainty import Uncertainty
 from softrobots.robots import HelixTube, InflatableArm, PccArm, TendonArm
 from softrobots.statics.loads import Load
@@ -110,7 +110,7 @@ def _rows(name: str, arrays: Mapping[str, Any]) -> Comparison | None:
         return None
     measurements, predicted, residuals = KINDS["measurements"].from_arrays(own), {}, {}
     for number, (key, measured) in enumerate(measurements.measured.items()):
-        predicted[key] = finite_array(key, arrays[f"{name}_predicted_{number}"], measured.shape)
+        predicted[key] = with_gaps(key, arrays[f"{name}_predicted_{number}"], measured.shape, "")
         found, counted = difference(measured, predicted[key]), arrays[f"{name}_counted_{number}"]
         if counted.dtype != bool or counted.shape != found.shape:
             raise FileFormatError(f"its {name} counted {key} is no array of truth values of shape {found.shape}")

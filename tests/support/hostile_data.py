@@ -93,7 +93,9 @@ def measurement_corpus() -> list[bytes]:
     poses = np.tile(np.eye(4), (2, 1, 1))
     rows = (
         results()["measurements"],
-        sr.Measurements(np.ones((2, 1)), poses={"tip": poses}, mass=[0.0, 1.0], gravity=(0, 0, -9.8)),
+        sr.Measurements(
+            np.ones((2, 1)), damping_ratios=[[0.1], [0.2]], poses={"tip": poses}, mass=[0.0, 1.0], gravity=(0, 0, -9.8)
+        ),
     )
     with TemporaryDirectory() as folder:
         return [one.to_csv(Path(folder) / f"{k}.csv").read_bytes() for k, one in enumerate(rows)]
