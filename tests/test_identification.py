@@ -351,7 +351,8 @@ def test_the_fitted_robot_is_written_as_a_file_of_parameters(noisy: sr.Measureme
         ("stiffness", {"loss": "l1"}, sr.ParameterError, "soft_l1"),
         ("stiffness", {"priors": {"radius": (0.05, 0.01)}}, sr.NameNotFound, "stiffness"),
         ("stiffness", {"priors": {"stiffness": 170.0}}, sr.ParameterError, "mean and standard deviation"),
-        ("stiffness", {"priors": {"stiffness": (170.0, 0.0)}}, sr.ParameterError, "positive"),
+        ("stiffness", {"priors": {"stiffness": (170.0, 0.0)}}, sr.ParameterError, r"positive \[N m/rad\]"),
+        ("wrist_mass", {}, sr.ParameterError, r"so that it has derivatives \(wrist_mass = .* without a wrist"),
         ("base.position", {"priors": {"base.position": ([0.0, 1.0], 1.0)}}, sr.ParameterError, r"shape \(3,\)"),
         ("base.position", {"priors": {"base.position": (0, 1), "base.position.x": (0, 1)}}, sr.ParameterError, "one for each"),
         ("stiffness", {"validation": np.ones(3, bool)}, sr.ParameterError, "mask of shape"),
@@ -425,6 +426,27 @@ def test_a_length_that_may_be_zero_has_an_interval_from_zero_on() -> None:
     again = sr.Measurements(commanded, force=forces, gravity=GRAVITY, tip_position=noisy, std=2e-3)
     low, high = sr.identify(replace(true, hinge_offset=0.04), again, ("stiffness", "hinge_offset")).intervals["hinge_offset"]
     assert 0.0 <= low < 0.002 < high < 0.3
+
+
+def test_a_robot_without_actuators_gives_its_stiffness_back_from_a_file(tmp_path: Path) -> None:
+    rod = sr.HelixTube(bending_stiffness=0.03, elastic_sections=6)
+    commanded, forces = np.zeros((3, 0)), rows(3, (1.0,), 0.03)[1]
+    chosen = ParameterSet.of(replace(rod, bending_stiffness=0.04), "bending_stiffness")
+    data = measured(chosen, [0.03], commanded, forces, seen=("tip_position",))
+    read = sr.Measurements.from_csv(data.to_csv(tmp_path / "rod.csv"))
+    assert read.q_motors.shape == (3, 0)
+    assert sr.identify(chosen.present.robot, read, "bending_stiffness").solution == pytest.approx([0.03], rel=1e-9)
+    sensitivity = sr.sensitivity(chosen.present, sr.solve_equilibrium(chosen.present, (), forces[0]), "bending_stiffness")
+    assert np.all(sensitivity.tip_position != 0.0)
+
+
+def test_a_fit_that_starts_at_the_truth_has_no_outliers() -> None:
+    """Differences of rounding alone are no standard deviation."""
+    commanded, forces = rows(12, (0.8, 0.8, 0.8), 5.0)
+    data = measured(ParameterSet.of(ARM, "stiffness"), [170.0], commanded, forces, seen=("tip_position",))
+    found = sr.identify(ARM, data, ("stiffness", "base.rotation"))
+    assert found.outliers == ()
+    assert np.ptp(found.intervals["base.rotation.x"]) < 1e-9
 
 
 def test_rows_without_an_equilibrium_are_named() -> None:

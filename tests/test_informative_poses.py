@@ -141,7 +141,7 @@ def test_poses_of_frames_are_candidates_whatever_their_rotation() -> None:
         ({"n": 7}, sr.ParameterError, "at most the number of candidates, 6"),
         ({"n": 0}, sr.ParameterError, "positive integer"),
         ({"std": {"tip_velocity": 1.0}}, sr.NameNotFound, "tip_position"),
-        ({"std": None}, sr.ParameterError, "at least one number of positions"),
+        ({"std": {}}, sr.ParameterError, "at least one number of positions"),
         ({"candidates": [[np.nan, 0.0]]}, sr.ParameterError, "finite numbers"),
         ({"parameters": ("stiffness", "tail")}, sr.NameNotFound, "stiffness"),
         ({"mass": None}, sr.ParameterError, "tell them apart; not so stiffness"),
@@ -160,6 +160,17 @@ def test_what_cannot_be_chosen_is_refused(change: dict[str, Any], error: type[Ex
         arguments["gravity"] = None
     with pytest.raises(error, match=re.escape(message)):
         sr.informative_poses(**arguments)
+
+
+def test_by_default_the_tip_is_measured() -> None:
+    arm, angles = sr.InflatableArm(stiffness=170.0), np.random.default_rng(4).uniform(-0.8, 0.8, (12, 3))
+    chosen, told = (
+        sr.informative_poses(
+            arm, ("stiffness", "hinge_offset"), angles, 3, gravity=sr.EARTH_GRAVITY, force=[[5.0, 3.0, -9.0]] * 12, std=std
+        )
+        for std in (None, {"tip_position": 1e-3})
+    )
+    np.testing.assert_array_equal(chosen.intervals, told.intervals)
 
 
 def test_measurements_have_their_own_loads_and_deviations() -> None:

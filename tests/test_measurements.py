@@ -242,7 +242,7 @@ def pose(row: int, column: int, value: float) -> Any:
 
 BAD_ARGUMENTS: list[tuple[dict[str, Any], str]] = [
     ({}, "at least one number of positions"),
-    ({"q_motors": np.zeros((0, 3)), "tip_position": np.zeros((0, 3))}, "at least one row of at least one actuator"),
+    ({"q_motors": np.zeros((0, 3)), "tip_position": np.zeros((0, 3))}, "at least one row"),
     ({"q_motors": [[1.0, math.nan]], "tip_position": TIPS[:1]}, "q_motors"),
     ({"tip_position": TIPS[:1]}, r"positions\.tip = .*shape \(2, 3\)"),
     ({"tip_position": [[math.inf, 0, 0], [0, 0, 0]]}, "positions.tip"),

@@ -278,3 +278,11 @@ def test_what_noise_hides_is_told_with_its_size() -> None:
     assert found.names == ("radius",)
     assert found.change == pytest.approx(0.002)  # by 1 %
     assert "2.0e-03 standard deviations" in found.text
+
+
+def test_what_noise_hides_is_no_scale() -> None:
+    """A force tells the scale of a stiffness badly; and of two stiffnesses, one is told well, so that the scale is known."""
+    badly = find_gauges([[0.2], [0.0]], (K1,))
+    unseen = find_gauges([[0.0], [0.0]], (K1,))
+    one_of_two = find_gauges([[0.0, 0.0], [0.0, 50.0]], (K1, K2))
+    assert [[one.kind for one in found] for found in (badly, unseen, one_of_two)] == [["alone"], ["scale"], ["alone"]]

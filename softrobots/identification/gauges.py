@@ -16,6 +16,7 @@ from softrobots.identification.uncertainty import UNDETERMINED, information, sca
 
 _STEP = 0.01  # largest change told, relative to what counts as large
 _LEFT_OUT = 1e-3  # share of the effect of the largest member below which a parameter is left out at once
+_SCALE = 1e-5  # change, relative to that of one member, above which noise hides a scale that a force does tell
 _SAME = 0.05  # relative difference below which two steps count as equal
 
 _FIX = "fix one of them or give it a prior"
@@ -131,9 +132,9 @@ def _told(
     steps = steps * np.copysign(_STEP / np.max(np.abs(steps) / sizes[members]), steps[0])
     chosen = [parameters[member] for member in members]
     change = float(np.max(np.abs(rows[:, members] @ steps), initial=0.0))
-    kind = _kind(
-        chosen, steps, not any(re.search(r"\b(N|Pa)\b", parameters[other].unit) for other in left if other not in members)
-    )
+    others = any(re.search(r"\b(N|Pa)\b", parameters[other].unit) for other in left if other not in members)
+    effect = float(np.max(np.linalg.norm(rows[:, members] * steps, axis=0))) if len(members) > 1 else 0.0
+    kind = _kind(chosen, steps, not others and change <= _SCALE * max(effect, 1e-6))
     names = [one.name for one in chosen]
     raised = [_amounts(chosen, steps, sign) for sign in (1.0, -1.0)]
     moves = " and ".join(f"{verb} {words}" for verb, words in zip(("raising", "lowering"), raised, strict=True) if words)
@@ -152,12 +153,12 @@ def _amounts(chosen: Sequence[Parameter], steps: FloatArray, sign: float) -> str
     return " and ".join(f"{' and '.join(names)} by {amount}" for amount, names in together.items())
 
 
-def _kind(chosen: Sequence[Parameter], steps: FloatArray, whole: bool) -> str:
-    """The kind of a combination, from the names and units of its members, how they change, and whether no other is a force."""
+def _kind(chosen: Sequence[Parameter], steps: FloatArray, scale: bool) -> str:
+    """The kind of a combination, from the names and units of its members, how they change, and whether it may be the scale."""
     names = [one.name for one in chosen]
     scales = [1.0 if one.logarithmic else one.value or np.inf for one in chosen]
     relative = steps / np.array(scales)
-    forces = whole and all(re.search(r"\b(N|Pa|kg)\b", one.unit) for one in chosen)
+    forces = scale and all(re.search(r"\b(N|Pa|kg)\b", one.unit) for one in chosen)
     if len(chosen) > 1 and all(re.search(r"pretension|preload|slack|motor.*offset", name) for name in names):
         return "preloads"
     if forces and np.ptp(relative) <= _SAME * np.max(np.abs(relative)) and np.all(relative != 0.0):

@@ -213,7 +213,10 @@ def prior_of(chosen: ParameterSet, priors: Mapping[str, tuple[Any, Any]]) -> Pri
             raise NameNotFound("fitted parameter", str(name), dict.fromkeys([*chosen.asked, *chosen.names]))
         if not isinstance(pair, tuple | list) or len(pair) != 2:
             raise ParameterError(f"priors[{name!r}]", pair, "a pair: mean and standard deviation")
-        mean, std = finite_array(f"priors[{name!r}]", pair[0], None), positive_array(f"priors[{name!r}]", pair[1], "")
+        mean, std = (
+            finite_array(f"priors[{name!r}]", pair[0], None),
+            positive_array(f"priors[{name!r}]", pair[1], chosen.units[chosen.names.index(members[0])]),
+        )
         if mean.shape not in ((), (len(members),)) or std.shape not in ((), (len(members),)):
             raise ParameterError(f"priors[{name!r}]", pair, f"numbers, or arrays of shape ({len(members)},)")
         places += [chosen.names.index(one) for one in members]

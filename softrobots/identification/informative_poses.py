@@ -22,6 +22,7 @@ from softrobots.identification.uncertainty import Uncertainty, uncertainty_from_
 _RIDGE = 1e-9  # information that stands for none while there are fewer rows than parameters, relative to a mean candidate
 _BETTER = 1e-9  # gain of the logarithm of the determinant from which poses are exchanged
 _SWEEPS = 50  # limit of rounds of exchange; 3 to 6 are usual
+_TIP = {"tip_position": 1e-3}  # measured where nothing is told, to 1 mm
 _DRAWS = 200  # random choices of which the median is told
 
 
@@ -84,7 +85,7 @@ def informative_poses(
             with `std` and `loads`.
         n: Number of poses to choose.
         std: With actuator coordinates: what is measured, with its standard deviation: "tip_position", "positions.NAME",
-            "poses.NAME", "motor_torques".
+            "poses.NAME", "motor_torques"; by default the position of the tip to 1 mm.
         measured: What has been measured already, with standard deviations.
         priors: `{name: (mean, standard deviation)}` as for `identify`.
         seed: Seed of the random choices for comparison.
@@ -100,7 +101,7 @@ def informative_poses(
         DescriptionError: If the robot cannot be loaded.
     """
     if not isinstance(candidates, Measurements):
-        candidates = _unmeasured(candidates, std or {}, loads)
+        candidates = _unmeasured(candidates, _TIP if std is None else std, loads)
     elif std is not None or loads:
         raise ParameterError("candidates", candidates, "actuator coordinates where std or loads are given beside them")
     chosen = ParameterSet.of(robot, parameters, candidates.markers)

@@ -97,7 +97,8 @@ class Layout(NamedTuple):
         found: dict[str, Any] = dict(self.constants)
         std: dict[str, FloatArray] = {}
         for group in self.groups:
-            values = np.column_stack([numbers(column) for column in group.columns]) * group.factors
+            none = np.zeros((len(numbers(self.numbers[0])) if self.numbers else 0, 0))  # a robot without actuators
+            values = np.column_stack([none, *map(numbers, group.columns)]) * group.factors
             if group.rotation:
                 values = _poses(values[:, :3], values[:, 3:], group.rotation)
             if group.std:
@@ -187,7 +188,8 @@ def _group(where: str, key: str, name: str, value: Any) -> Group:
     quantity, pose = QUANTITIES[key], key == "poses"
     keys = ["columns", "unit", "scale", *(["std"] if quantity.measured else []), *(["relative"] if key == "actuators" else [])]
     entry = _entry(where, value, (*keys, *(("angle_unit", *ROTATIONS) if pose else ())))
-    columns = _words(f"{where}.columns", entry.get("columns"), quantity.width)
+    none = key == "actuators" and entry.get("columns") == []
+    columns = () if none else _words(f"{where}.columns", entry.get("columns"), quantity.width)
     units = _units(f"{where}.unit", entry.get("unit"), quantity.kinds, len(columns))
     scale = finite_array(f"{where}.scale", entry.get("scale", 1.0), None)
     if scale.shape not in ((), (len(columns),)) or np.any(scale == 0.0):

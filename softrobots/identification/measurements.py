@@ -111,8 +111,8 @@ class Measurements:
         """
         motors = finite_array("q_motors", q_motors, (None, None), "rad, m, N or Pa")
         n = len(motors)
-        if motors.size == 0:
-            raise ParameterError("q_motors", q_motors, "at least one row of at least one actuator")
+        if not n:
+            raise ParameterError("q_motors", q_motors, "at least one row")
         places = by_name("positions", positions)
         if tip_position is not None:
             if TIP in places:

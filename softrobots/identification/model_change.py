@@ -100,6 +100,7 @@ def differences(
     Raises:
         ParameterError: If the arrays have other shapes to both sides, or the robot refuses values there.
     """
+    refusal = ""
     scale = abs(value) if parameter.logarithmic else max(abs(value), _TYPICAL.get(parameter.unit, 1.0))
     for step, weights in (_FOURTH_ORDER if fourth_order else _CENTRAL, _UPWARDS, _DOWNWARDS):
         tried = {number: value + number * step * scale for number in weights}
@@ -107,12 +108,13 @@ def differences(
             continue
         try:
             moved = [(weight / (step * scale), at(tried[number])) for number, weight in weights.items()]
-        except SoftRobotsError:
+        except SoftRobotsError as error:
+            refusal = f" ({error})"
             continue
         if all(other[name].shape == base[name].shape for _, other in moved for name in base):
             return {name: np.sum([weight * (other[name] - base[name]) for weight, other in moved], axis=0) for name in base}
     requirement = "a value about which the structure of the robot stays as it is, so that it has derivatives"
-    raise ParameterError(parameter.name, value, requirement)
+    raise ParameterError(parameter.name, value, requirement + refusal)
 
 
 def _twists(placements: FloatArray, slopes: FloatArray) -> FloatArray:

@@ -11,6 +11,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 
 _LEAST = 1e-9  # of an unknown standard deviation, relative to the differences at the start
+_ROUNDING = 1e-9  # least such differences, in the unit of the quantity: a start that is exact says nothing of the errors
 
 
 @dataclass(frozen=True)
@@ -37,7 +38,7 @@ class Weights:
         start = cls(
             {key: given.get(key, np.ones_like(values)) for key, values in differences.items()}, counted, frozenset(given)
         )
-        return start._rescaled(differences, lambda numbers: float(np.sqrt(np.mean(numbers**2))) or 1.0)
+        return start._rescaled(differences, lambda numbers: max(float(np.sqrt(np.mean(numbers**2))), _ROUNDING))
 
     def every(self, step: int) -> Weights:
         """Return those of every row whose number is a multiple of a step."""
