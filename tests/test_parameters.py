@@ -9,9 +9,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.identification.parameters import ParameterSet
+from tests.support.laws import law
 
 ARM = sr.InflatableArm(stiffness=(150.0, 190.0), hinge_offset=(0.03, 0.05))
 PCC = sr.PccArm(kind="elastic", muscle_pretension=(8.0, 12.0), elastic_sections=1)
@@ -91,6 +94,21 @@ def test_the_assumed_stiffness_is_where_a_fit_starts() -> None:
     found = ParameterSet.of(robot, "stiffness")
     assert found.values.tolist() == [172.71]  # mean of the paper's Table 3
     assert found.model(found.values).stiffness.tolist() == sr.load_model(robot).stiffness.tolist()
+
+
+@law("identification.parameters.ParameterSet")
+@given(st.tuples(*(st.floats(*ends) for ends in ((50, 900), (50, 900), (0.01, 0.1), (0.2, 0.9), (-0.2, 0.2)))))
+@settings(max_examples=10)
+def test_a_model_has_the_values_of_its_parameters(values: tuple[float, ...]) -> None:
+    first, second, offset, length, rest = values
+    names = ("link[*].stiffness", "hinge_offset", "link_lengths[2]", "joint[spring_1_up].rest")
+    found = ParameterSet.of(ARM, names)
+    wanted = replace(ARM, stiffness=(first, second), hinge_offset=offset, link_lengths=(0.6, length))
+    assert found.robot(values) == wanted
+    mine = found.model(values)
+    other = sr.load_model(wanted, springs={"spring_1_up": (first, rest)})
+    assert mine.spring_table == other.spring_table
+    assert mine.urdf == other.urdf
 
 
 def test_pose_of_base_markers_and_offsets_leave_the_model_as_it_is() -> None:
