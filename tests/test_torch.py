@@ -6,12 +6,15 @@ PyTorch is in no extra but its own: where it is not installed, these tests are s
 from __future__ import annotations
 
 import importlib.util
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
 import softrobots as sr
+from tests.conftest import CHECKOUT
+from tests.support.documentation import PageRunner
 
 if importlib.util.find_spec("torch") is None:
     pytest.skip("PyTorch is not installed", allow_module_level=True)
@@ -82,3 +85,18 @@ def test_what_torch_functions_refuse(equilibrium: Any) -> None:
     (slope,) = torch.autograd.grad(equilibrium(one, FORCES[0])[1].sum(), one, create_graph=True)
     with pytest.raises(NotImplementedError, match="first derivatives only"):
         slope.sum().backward()
+
+
+@pytest.mark.system
+def test_the_page_of_design_finds_the_arm_that_scipy_finds(tmp_path: Path) -> None:
+    """The block of PyTorch in docs/design.md prints what the page says; the others are run by `test_documentation.py`."""
+    page = (CHECKOUT / "docs" / "design.md").read_text(encoding="utf-8")
+    arm, _, rest = page.partition("## In closed form")
+    text = arm + rest[rest.index("## With PyTorch") :]
+    marks = [line for line in text.splitlines() if line.startswith("<!-- not run: needs PyTorch; tests/test_torch.py")]
+    assert len(marks) == 2
+    for mark in marks:
+        text = text.replace(mark, "")
+    runner = PageRunner("docs/design.md", text, tmp_path)
+    runner.run()
+    assert runner.ran == 5
