@@ -128,6 +128,35 @@ def test_a_unit_that_is_wrong_is_told_before_and_after_the_fit(folder: Path, tol
     assert "hint: positions.tip: dividing it by 1000 (mm (N mm, g) taken for m (N m, kg)" in out
 
 
+def test_a_prior_may_be_around_the_value_that_the_robot_has(folder: Path, told: Told) -> None:
+    """As with the mean written out; of a standard deviation of 10 % that of the mean."""
+    set_to = ("--set", "stiffness=[140, 160]")
+    for short, long in (("2.5", "2.5"), ("5%", "7")):
+        words = (*set_to, "--fit", "link[*].stiffness, base.position", "--prior", f"link[*].stiffness={short}", "--json")
+        status, out, err = told(*WORDS, *words)
+        assert status == 0, err
+        found = json.loads(out)["parameters"]
+        assert found["link[1].stiffness"]["prior"] == pytest.approx([140.0, float(long)], rel=1e-12)
+        assert found["link[2].stiffness"]["prior"] == pytest.approx([160.0, 8.0 if "%" in short else 2.5], rel=1e-12)
+
+
+def test_errors_are_told_also_without_their_mean(folder: Path, told: Told) -> None:
+    """Of a base that is 0.1 m away and not fitted, the mean of the differences takes all but the bend of another stiffness."""
+    _, out, _ = told(*WORDS, "--fit", "hinge_offset", "--hold-out", "day3", "-o", "fit", "--json")
+    answer = json.loads(out)
+    with (folder / "fit" / "predictions.csv").open(encoding="utf-8") as file:
+        rows = list(csv.DictReader(file))
+    for name in ("fitted", "validation"):
+        left = np.array([[row[f"residual positions.tip {axis} [m]"] for axis in "xyz"] for row in rows if row["set"] == name])
+        each = left.astype(float) - left.astype(float).mean(axis=0)
+        error = answer[name]["without_mean"]["positions.tip"]
+        assert error == pytest.approx(float(np.sqrt(np.mean(np.sum(each**2, axis=1)))), rel=1e-9)
+        assert error < answer[name]["errors"]["positions.tip"]["root_mean_square"]
+    report = (folder / "fit" / "report.txt").read_text(encoding="utf-8")
+    assert f"positions.tip, without the mean of kept aside rows: {error:.4g} m" in report
+    assert "times the standard deviation that was given" in report
+
+
 @each_row(("message", "status"), [(INTERRUPTED, 130), ("at most 100 steps", 1)])
 def test_a_fit_that_ends_early_is_kept(
     message: str, status: int, folder: Path, told: Told, monkeypatch: pytest.MonkeyPatch
@@ -151,8 +180,11 @@ def test_springs_of_a_foreign_file_are_options_of_other_commands(folder: Path, t
 BAD: list[tuple[tuple[Any, ...], str]] = [
     ((*FIT, "--loss", "square"), "invalid choice: 'square'"),
     ((*FIT, "--starts", "0"), "--starts = 0"),
-    ((*FIT, "--prior", "stiffness=1"), "NAME=MEAN,STD is required"),
+    ((*FIT, "--prior", "stiffness"), "NAME=MEAN,STD or NAME=STD is required"),
+    ((*FIT, "--prior", "stiffness=1,2,3"), "NAME=MEAN,STD or NAME=STD is required"),
     ((*FIT, "--prior", "stiffness=1,-1"), "--prior"),
+    ((*FIT, "--prior", "base.position=10%"), "--prior must be positive"),
+    ((*FIT, "--prior", "stifness=10%"), "did you mean 'stiffness'"),
     ((*FIT, "--prior", "stiffness=1,1", "--prior", "stiffness=1,2"), "given once for each parameter"),
     ((*FIT, "--prior", "radius=1,1"), "no fitted parameter is called 'radius'"),
     (("--fit", "stifness"), "did you mean 'stiffness'"),

@@ -312,7 +312,7 @@ def test_coordinates_that_a_robot_cannot_have_are_named_by_their_row() -> None:
     pcc = sr.load_model(sr.PccArm(segment_lengths=(0.4,)))
     pulls = np.zeros((4, 3))
     pulls[2, 1] = 1.0  # longer than the muscle is
-    with pytest.raises(sr.ParameterError, match=r"q_motors \(line 9\)"):
+    with pytest.raises(sr.ParameterError, match=r"q_motors \(line 9\).*are unit and sign right\?"):
         sr.Measurements(pulls, tip_position=np.ones((4, 3)), relative=True, lines=[2, 4, 9, 10]).check(pcc)
 
 

@@ -128,6 +128,19 @@ def test_a_frame_that_is_not_the_one_measured_is_told() -> None:
     assert hints(sr.identify(arm, right, "base.position")) == []
 
 
+def test_positions_that_nothing_explains_are_told_with_their_share(tips: Any) -> None:
+    """Rows in another order than the commands, far beyond the standard deviation that was given."""
+    arm = sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.3)))
+    rows = sr.Measurements(MOTORS, tip_position=RNG.permutation(tips), gravity=(0, 0, -9.81), std=0.02)
+    fit = sr.identify(arm, rows, ("base.position", "base.rotation"))
+    unexplained, far = hints(fit)
+    left, measured = fit.residuals["positions.tip"], rows.measured["positions.tip"]
+    share = 100.0 * np.var(left, axis=0).sum() / np.var(measured, axis=0).sum()  # by its definition
+    assert f"positions.tip: {share:.2g} % of the variance are left unexplained" in unexplained
+    size = float(re.search(r"is ([\d.]+) times the standard deviation that was given", far)[1])  # type: ignore[index]
+    assert size == pytest.approx(left.std() / 0.02, rel=0.5)  # the median of 120 numbers that are not quite normal
+
+
 def test_the_recordings_are_not_doubted() -> None:
     folder = CHECKOUT / "docs" / "examples" / "tdcr_v4"
     rows = sr.Measurements.from_csv(folder / "train.csv", folder / "columns.yaml")

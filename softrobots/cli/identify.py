@@ -9,6 +9,8 @@ import warnings
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from softrobots.cli.options.robot_argument import add_model, statics_model_of
 from softrobots.cli.options.robot_parameters import name_of, write_robot
 from softrobots.cli.reports.answers import add_json, plain, print_answer
@@ -22,6 +24,7 @@ from softrobots.identification.fit import INTERRUPTED
 from softrobots.identification.identification import Identification
 from softrobots.identification.identify import LOSSES, identify
 from softrobots.identification.measurements import Measurements
+from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.suspicions import doubtful_sizes
 from softrobots.model.soft_model import SoftModel
 from softrobots.view.figures.canvas import write_png
@@ -66,8 +69,11 @@ def add_parser(subparsers: Any) -> None:
         "set with the least error on families of rows that are left out in turn is taken (required)"
     )
     parser.add_argument("--fit", action="append", required=True, metavar="NAME,NAME", help=help_text)
-    help_text = "what is known of a parameter: mean and standard deviation, in its unit; once for each (nothing)"
-    parser.add_argument("--prior", action="append", type=prior, default=[], metavar="NAME=MEAN,STD", help=help_text)
+    help_text = (
+        "what is known of a parameter before: mean (the value that the robot has) and standard deviation, in its unit or as in "
+        "10%% of the mean; once for each (nothing)"
+    )
+    parser.add_argument("--prior", action="append", type=prior, default=[], metavar="NAME=[MEAN,]STD", help=help_text)
     help_text = "loss of a residual; outliers count less in all but the first (%(default)s)"
     parser.add_argument("--loss", choices=LOSSES, default=LOSSES[0], help=help_text)
     help_text = "number of starts: the present values, then random ones around them (%(default)s)"
@@ -92,8 +98,7 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> bool:
     """Read, fit, write the files and print the answer; return False if the fit did not converge."""
     positive_integer("--starts", arguments.starts)
-    priors = dict(arguments.prior)
-    if len(priors) < len(arguments.prior):
+    if len(dict(arguments.prior)) < len(arguments.prior):
         raise ParameterError("--prior", [name for name, _ in arguments.prior], "given once for each parameter")
     if arguments.output is not None:
         for name in (*_FILES, *(f"{picture}.png" for picture in _PICTURES)):
@@ -104,6 +109,10 @@ def run(arguments: argparse.Namespace) -> bool:
     for doubt in doubtful_sizes(rows, model):
         warnings.warn(doubt, stacklevel=1)
     sets = {text: re.split(r",(?![^\[]*\])", text.replace(" ", "")) for text in arguments.fit}
+    priors = {}
+    for name, (mean, std, relative) in arguments.prior:
+        values = ParameterSet.of(model, name, rows.markers).values if mean is None else np.array(mean)
+        priors[name] = (values, std * np.abs(values) if relative else std)
     options = {"loss": arguments.loss, "priors": priors, "starts": arguments.starts}
     aside: Any = arguments.hold_out
     if arguments.validate is not None:
@@ -128,16 +137,18 @@ def run(arguments: argparse.Namespace) -> bool:
     return found.message == "converged"
 
 
-def prior(word: str) -> tuple[str, tuple[float, float]]:
-    """Parse NAME=MEAN,STD."""
+def prior(word: str) -> tuple[str, tuple[float | None, float, bool]]:
+    """Parse NAME=[MEAN,]STD[%]: mean (None if it is not told), standard deviation, and whether that is relative."""
     name, _, numbers = word.rpartition("=")
+    *mean, std = numbers.split(",")
     try:
-        mean, std = map(float, numbers.split(","))
+        known = [float(one) for one in mean]
+        size = float(std.removesuffix("%")) * (0.01 if std.endswith("%") else 1.0)
     except ValueError:
         name = ""
-    if not name:
-        raise argparse.ArgumentTypeError(f"{word!r}: NAME=MEAN,STD is required")
-    return name, (mean, std)
+    if not name or len(mean) > 1:
+        raise argparse.ArgumentTypeError(f"{word!r}: NAME=MEAN,STD or NAME=STD is required")
+    return name, (known[0] if known else None, size, std.endswith("%"))
 
 
 def _compare(

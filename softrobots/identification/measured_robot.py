@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
 from softrobots.identification.measurement_checks import TIP
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.loads import Load
@@ -55,3 +56,16 @@ def load_cases(loads: Mapping[str, FloatArray], count: int) -> list[Load]:
     frames = [name for name in loads if name]
     gravities = [None] * count if "" not in loads else [tuple(one) for one in loads[""].tolist()]
     return [Load({name: loads[name][row] for name in frames}, one) for row, one in enumerate(gravities)]
+
+
+def check_coordinates(model: SoftModel, motors: FloatArray, where: Callable[[int], str]) -> None:
+    """Refuse actuator coordinates, shape (n, n_motors), that a robot cannot have.
+
+    Raises:
+        ParameterError: If a row is none; names it.
+    """
+    for row, one in enumerate(motors):
+        try:
+            model.checked_motors(one, f"q_motors ({where(row)})")
+        except ParameterError as error:
+            raise ParameterError(error.field, error.value, f"{error.requirement}; are unit and sign right?") from error

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path, csv_text, write_text
-from softrobots.identification.measured_robot import frame_of, wrenches_on
+from softrobots.identification.measured_robot import check_coordinates, frame_of, wrenches_on
 from softrobots.identification.measurement_checks import (
     TIP,
     by_name,
@@ -275,8 +275,7 @@ class Measurements:
         wrenches_on(model, self.loads)
         for name in (*self.markers, *(key.partition(".")[2] for key in self.measured if "." in key)):
             frame_of(model, name, self.markers)
-        for row, motors in enumerate(self.motor_coordinates(model)):
-            model.checked_motors(motors, f"q_motors ({self.where(row)})")
+        check_coordinates(model, self.motor_coordinates(model), self.where)
 
     def motor_coordinates(self, model: SoftModel) -> FloatArray:
         """Return actuator coordinates of a robot, shape (n, m): those commanded, or its relaxed lengths minus the pulls."""

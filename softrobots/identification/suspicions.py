@@ -38,18 +38,35 @@ FAR_LESS = 0.25
 _FEWEST = 4  # rows
 _MOST_SOLVED = 50  # rows in which other frames are tried
 _SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; other parameters are not right yet either
+_MUCH = 0.1  # share of the variance that no robot with the right columns leaves
+_TO_STD = 1.4826  # standard deviation of normal numbers over the median of their size
+_BADLY = 2.0  # times the standard deviation that was given, above which noise alone is no explanation
 _EARTH = (9.76, 9.84)  # gravity on the ground [m/s^2]
 
 
 def hints(found: Identification) -> list[str]:
     """Return what may be wrong with the measurements of a fit, in plain sentences; see `suspicions`. Empty if nothing is."""
-    rows, texts = found.fitted.measurements, []
+    rows = found.fitted.measurements
+    texts: list[str] = []
     few = slice(None, None, -(-len(rows) // _MOST_SOLVED))
     for key, values in found.fitted.predicted.items():
-        measured, predicted = _points(rows.measured[key]), _points(values)
+        measured, predicted, before = _points(rows.measured[key]), _points(values), len(texts)
         texts += suspicions(measured, predicted, rows.q_motors, name=key)
         if key.startswith(("positions.", "poses.")) and _unexplained(measured, predicted) > UNEXPLAINED:
             texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
+        if len(texts) == before and (share := _unexplained(measured, predicted)) > _MUCH:
+            texts.append(
+                f"{key}: {100.0 * share:.2g} % of the variance are left unexplained: are order and signs of the actuators "
+                "right, and is all fitted that may differ?"
+            )
+        if key in rows.std:
+            sizes = np.abs(found.residuals[key] / rows.std[key])
+            ratio = _TO_STD * float(np.median(sizes[np.isfinite(sizes)]))
+            if ratio > _BADLY:
+                texts.append(
+                    f"{key}: what is left is {ratio:.2g} times the standard deviation that was given: the robot differs in "
+                    "what is not fitted, or the standard deviation is larger; the intervals by rows are too narrow"
+                )
     return texts
 
 

@@ -48,6 +48,9 @@ def identification_answer(found: Identification, compared: CrossValidation | Non
 def identification_lines(found: Identification, compared: CrossValidation | None) -> list[str]:
     """The same for a person."""
     lines = found.summary().splitlines()
+    for title, one in (("fitted", found.fitted), ("kept aside", found.validation)):
+        about_mean = {} if one is None else _about_mean(one)
+        lines += [f"{key}, without the mean of {title} rows: {error:.4g} m" for key, error in about_mean.items()]
     lines += [f"hint: {text}" for text in hints(found)]
     if found.robot is None:
         words = (f"--spring {joint}={stiffness:.6g},{rest:.6g}" for joint, (stiffness, rest) in _springs(found).items())
@@ -94,7 +97,14 @@ def _axes(key: str, values: FloatArray) -> list[str]:
 
 def _errors(one: Comparison) -> dict[str, Any]:
     errors = {key: {"root_mean_square": error, "unit": unit} for key, (error, unit) in one.errors.items()}
-    return {"rows": len(one.measurements), "errors": errors}
+    return {"rows": len(one.measurements), "errors": errors, "without_mean": _about_mean(one)}
+
+
+def _about_mean(one: Comparison) -> dict[str, float]:
+    """Root mean square of differences of positions after their mean is subtracted [m]: a shift of the frame does not count."""
+    positions = {key: values for key, values in one.residuals.items() if key.startswith("positions.")}
+    variances = {key: np.ma.masked_invalid(values).var(axis=0).filled(0.0) for key, values in positions.items()}
+    return {key: float(np.sqrt(np.sum(each))) for key, each in variances.items()}
 
 
 def _springs(found: Identification) -> dict[str, tuple[float, float]]:
