@@ -74,6 +74,21 @@ def test_a_load_estimate_inverts_the_equilibrium(jax: Any) -> None:
     assert np.asarray(by_torques) @ sr.elastostatic_jacobian(found.model, found)[:3].T == pytest.approx(np.eye(3), abs=1e-9)
 
 
+def test_gradients_of_a_tendon_arm_are_differences(jax: Any) -> None:
+    """Of a robot that is not compiled, under `jit` and `vmap`."""
+    arm = sr.TendonArm(segment_lengths=(0.06,), elastic_sections=2)
+    solve = sr.jax.equilibrium(arm, ("tendon_stiffness", "tendon_pretension"), gravity=sr.EARTH_GRAVITY)
+    pulled, force = np.array([[0.058, 0.064, 0.062], [0.06, 0.059, 0.061]]), np.array([0.2, 0.1, -0.1])
+
+    def height(scaled: Any) -> Any:
+        return jax.vmap(lambda q: solve(q, force, scaled * solve.values)[1][0])(pulled).sum()
+
+    slopes = np.asarray(jax.jit(jax.grad(height))(np.ones(2)))
+    for place, slope in enumerate(slopes):
+        step = 1e-4 * np.eye(2)[place]
+        assert slope == pytest.approx(float(height(1.0 + step) - height(1.0 - step)) / 2e-4, rel=1e-5)
+
+
 def test_what_jax_functions_refuse(jax: Any, equilibrium: Any) -> None:
     with pytest.raises(NotImplementedError, match="first derivatives only"):
         jax.hessian(lambda q: equilibrium(q, FORCES[0])[1].sum())(MOTORS[0])

@@ -47,6 +47,20 @@ def test_derivatives_are_differences_in_both_modes(equilibrium: Any, rows: int) 
     assert torch.autograd.gradcheck(of_scaled, given, eps=1e-5, atol=1e-7, rtol=1e-7, check_forward_ad=True)
 
 
+def test_derivatives_of_an_arm_with_sections_are_differences() -> None:
+    """Of a robot that is not compiled, along random directions: given lengths."""
+    arm = sr.PccArm(segment_lengths=(0.3,), elastic_sections=1)
+    solve = sr.torch.equilibrium(arm, "bending_stiffness", gravity=sr.EARTH_GRAVITY)
+    lengths = torch.tensor([[2.8, 3.2, 3.0]], dtype=torch.float64)
+    given = [lengths, FORCES[:1], torch.ones(1, dtype=torch.float64)]
+
+    def of_scaled(lengths: Any, forces: Any, scaled: Any) -> Any:
+        return solve(0.1 * lengths, 0.5 * forces, scaled * solve.values)
+
+    given = [one.clone().requires_grad_() for one in given]
+    assert torch.autograd.gradcheck(of_scaled, given, eps=1e-5, atol=1e-7, rtol=1e-7, check_forward_ad=True, fast_mode=True)
+
+
 def test_transformations_agree(equilibrium: Any) -> None:
     """A batch by `vmap`, by leading dimensions and row by row; forward and reverse mode."""
     from torch.func import grad, jacfwd, jacrev, vmap

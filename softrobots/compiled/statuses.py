@@ -38,7 +38,7 @@ _WORDS = {
     Status.UNSTABLE: "in balance, but not stable",
     Status.UNSETTLED: "not in balance",
     Status.OUT_OF_RANGE: "a section is at the end of its range",
-    Status.NOT_A_NUMBER: "a number that is not finite, or too large to compute with",
+    Status.NOT_A_NUMBER: "a number that is not finite, or too large to compute with, or lengths that no shape has",
     Status.UNOBSERVABLE: "the motors do not feel every direction of the force",
     Status.NOT_REACHED: "no force explains the torques, or the target is not reached",
     Status.BEYOND_LIMITS: "the target is reached only with a motor beyond its limits",

@@ -9,6 +9,7 @@ from typing import Any, Literal
 
 import numpy as np
 
+from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.run.backends import BACKENDS, available_backend
 from softrobots.compiled.run.batches import gravity_vector, unusable, without
 from softrobots.compiled.run.compiled_model import CompiledModel
@@ -16,8 +17,9 @@ from softrobots.compiled.run.responses import Cases
 from softrobots.compiled.settings import LARGEST_POSITION
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, choice, positive_integer
-from softrobots.core.errors import EquilibriumNotFound, LoadNotFound, ParameterError
+from softrobots.core.errors import DescriptionError, EquilibriumNotFound, LoadNotFound, ParameterError
 from softrobots.identification.parameters import OF_MODEL, ParameterSet
+from softrobots.learning.general_solver import GeneralSolver
 from softrobots.learning.number_changes import NumberChanges
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.loader import load_model
@@ -25,6 +27,9 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.load_estimation import check_feels
 
 Kind = Literal["equilibrium", "estimate"]
+GENERAL = "pinocchio"
+"""Name of the back end that solves every robot without dry friction; see `softrobots.learning.general_solver`."""
+
 _ADVICE = '; failed="nan" marks such rows instead'
 
 
@@ -51,7 +56,8 @@ class Differentiable:
         self._gravity = gravity_vector(gravity)
         self._threads, self._failed = positive_integer("threads", threads), choice("failed", failed, ("raise", "nan"))
         given = robot.model if isinstance(robot, CompiledModel) else robot
-        chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
+        if backend is not None:
+            choice("backend", backend, (*BACKENDS, GENERAL))
         names = [parameters] if isinstance(parameters, str) else list(parameters)
         self._set = ParameterSet.of(given, names) if names else ParameterSet(_loaded(given), (), {})
         for one in self._set.parameters:
@@ -59,14 +65,23 @@ class Differentiable:
                 requirement = "parameters of the robot or offsets of motors; actuators and loads are arguments of their own"
                 raise ParameterError("parameters", one.name, requirement)
         self.model = self._set.present
-        check_frictionless(self.model, "compiled derivatives")
+        check_frictionless(self.model, "derivatives of batches")
         if kind == "estimate":
             check_feels(self.model)
             if self.model.n_motors < 3:
                 raise ParameterError(
                     "robot", self.model.pinocchio.name, "a robot with three motors at least, which feel every force"
                 )
-        self._changes = NumberChanges(self._set, chosen, weight=gravity is not None)
+        chosen = backend or (available_backend() if _is_unrolled(self.model) else GENERAL)
+        self._changes: NumberChanges | GeneralSolver
+        if chosen != GENERAL:
+            self._changes = NumberChanges(self._set, chosen, weight=gravity is not None)
+        else:
+            self._changes = GeneralSolver(self._set, weight=gravity is not None)
+            felt = int(self.model.actuators.feels.sum())
+            if kind == "estimate" and felt != 3:
+                requirement = f"a robot of which three actuators feel the load ({felt} do), or a chain that is compiled"
+                raise ParameterError("robot", self.model.pinocchio.name, f"{requirement}, for derivatives of load estimates")
         self.names, self.present = self._set.names, self._set.values
         m, n = self.model.n_motors, self.model.n_springs
         self.inputs = (m, m if kind == "estimate" else 3, len(self.present))
@@ -119,16 +134,12 @@ class Differentiable:
         lead = _lead([*inputs, *results, *given])
         of_motors, of_load, of_parameters = (_flat(one, lead) for one in given)
         of_motors = of_motors + of_parameters @ self._offsets.T
-        found = _Parts(math.prod(lead))
-        for rows, values, cases, failed in self._cases(inputs, results, lead):
+        found = _Parts(math.prod(lead), np.nan)
+        for rows, count, values, cases in self._cases(inputs, results, lead):
             code, numbers, slopes = self._changes.code(values, slopes=rates[2] is not None)
             of_numbers = _picked(of_parameters, rows) @ slopes.T if slopes.size else np.zeros_like(numbers)
             whole = _picked(of_motors, rows), _picked(of_load, rows), of_numbers
-            pushed = code.push(self.kind, cases, self._gravity, numbers, whole, self._threads, len(failed))
-            if np.any(failed):
-                for part in pushed:
-                    part[failed] = np.nan
-            found.put(rows, pushed)
+            found.put(rows, code.push(self.kind, cases, self._gravity, numbers, whole, self._threads, count))
         return tuple(part.reshape(*lead, -1) for part in found.arrays)
 
     def pull(
@@ -156,12 +167,10 @@ class Differentiable:
         sums = np.zeros(values_of.shape)
         by_group = sums.reshape(math.prod(sums.shape[:-1]), -1)
         found = _Parts(math.prod(lead))
-        for group, (rows, values, cases, failed) in enumerate(self._cases([*inputs[:2], values_of], results, lead)):
+        for group, (rows, count, values, cases) in enumerate(self._cases([*inputs[:2], values_of], results, lead)):
             code, numbers, slopes = self._changes.code(values, slopes=shapes[2] is not None)
             picked = [_picked(one, rows) for one in given]
-            if np.any(failed):
-                picked = [np.where(failed[:, None], 0.0, one) for one in picked]
-            *pulled, of_numbers = code.pull(self.kind, cases, self._gravity, numbers, picked, self._threads, len(failed))
+            *pulled, of_numbers = code.pull(self.kind, cases, self._gravity, numbers, picked, self._threads, count)
             found.put(rows, pulled)
             if shapes[2] is not None:
                 by_group[group] = of_numbers @ slopes + pulled[0].sum(axis=0) @ self._offsets
@@ -182,24 +191,20 @@ class Differentiable:
 
     def _cases(
         self, inputs: Sequence[Any], results: Sequence[Any], lead: tuple[int, ...]
-    ) -> Iterator[tuple[Any, tuple[float, ...], Cases, Any]]:
-        """Yield rows, values of the parameters, cases, and the mask of those that failed, which are replaced."""
+    ) -> Iterator[tuple[Any, int, tuple[float, ...], Cases]]:
+        """Yield rows, without those that failed, their number, values of the parameters, and the cases."""
         motors, load = (_flat(one, lead) for one in inputs[:2])
         springs, _, *force = (_flat(one, lead) for one in results)
-        whole = np.zeros(math.prod(lead), dtype=bool)
+        solved = np.ones(math.prod(lead), dtype=bool)
         if not np.isfinite(springs.sum()):
-            whole |= ~np.all(np.isfinite(springs), axis=1)
-            motors, load, springs = (np.where(whole[:, None], 0.0, one) for one in (motors, load, springs))
-            force = [np.where(whole[:, None], 0.0, one) for one in force]
+            solved &= np.all(np.isfinite(springs), axis=1)
         for rows, values in _groups(inputs[2], lead):
+            if not np.all(solved[rows]):
+                rows = np.arange(len(solved))[rows][solved[rows]]
             torques = _picked(load, rows) if force else np.zeros((1, self.model.n_motors))
             at = self._true(_picked(motors, rows), values)
-            yield (
-                rows,
-                values,
-                Cases(at, _picked(force[0] if force else load, rows), torques, _picked(springs, rows)),
-                whole[rows],
-            )
+            cases = Cases(at, _picked(force[0] if force else load, rows), torques, _picked(springs, rows))
+            yield rows, len(solved[rows]), values, cases
 
     def _refuse_input(self, bad: Any) -> None:
         """Refuse numbers that are not finite or too large."""
@@ -223,8 +228,8 @@ class Differentiable:
 class _Parts:
     """Arrays with one row a case, put together from parts."""
 
-    def __init__(self, count: int) -> None:
-        self._count = count
+    def __init__(self, count: int, missing: float = 0.0) -> None:
+        self._count, self._missing = count, missing
         self.arrays: list[Any] = []
 
     def put(self, rows: Any, parts: Sequence[Any]) -> None:
@@ -233,13 +238,21 @@ class _Parts:
             self.arrays = list(parts)
             return
         if not self.arrays:
-            self.arrays = [np.zeros((self._count, *part.shape[1:]), dtype=part.dtype) for part in parts]
+            self.arrays = [np.full((self._count, *part.shape[1:]), self._missing, dtype=part.dtype) for part in parts]
         for array, part in zip(self.arrays, parts, strict=True):
             array[rows] = part
 
 
 def _loaded(robot: Any) -> SoftModel:
     return robot if isinstance(robot, SoftModel) else load_model(robot)
+
+
+def _is_unrolled(model: SoftModel) -> bool:
+    """Whether compiled code has derivatives of the robot."""
+    try:
+        return Unknowns(model.chain()).is_unrolled
+    except DescriptionError:
+        return False
 
 
 def _lead(arrays: Sequence[Any]) -> tuple[int, ...]:

@@ -26,7 +26,7 @@ def model_numbers(model: SoftModel) -> Numbers:
     them; `masses` (n_joints, 4): mass and first moment of the bodies beyond joints; `stiffness` and `rest` (n_strains,);
     `moments` (n_groups,): the moment of the law of each inflated link; `section_lengths` (n_sections,) and `section_joints`
     (n_sections, 6): of sections of constant strain; `path_*` (n_paths, ...): constants of `MusclePaths`; `path_rest`,
-    `straightened` and `laws` (n_muscles, ...): of actuators, see `LAW`; `held_slopes`: of `MuscleLengths`;
+    `straightened` and `laws` (n_muscles, ...): of actuators, see `LAW`; `held_slopes` and `held_elastic`: of `MuscleLengths`;
     `bending_friction` and `guide_friction`: of `DryFriction`.
     """
     rigid, structure, held = model.pinocchio, model.structure, model.structure.muscle_lengths
@@ -51,6 +51,7 @@ def model_numbers(model: SoftModel) -> Numbers:
         "straightened": paths.straightened,
         "laws": np.array(laws).reshape(-1, len(LAW)),
         "held_slopes": np.zeros((0, 0)) if held is None else held.slopes,
+        "held_elastic": np.zeros((0, 0)) if held is None else held.elastic,
         "bending_friction": np.zeros(0) if friction is None else friction.limit,
         "guide_friction": np.zeros(0) if friction is None else friction.coefficient,
     }

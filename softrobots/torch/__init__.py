@@ -30,8 +30,10 @@ def equilibrium(
         robot: The robot: a dataclass of parameters, a `SoftModel`, or what `softrobots.compile` returns.
         parameters: Names of parameters of the robot, as for `softrobots.sensitivity`, and offsets of motors.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-        backend: "numba" or "python", as for `softrobots.compile`.
-        threads: Number of threads.
+        backend: "numba" or "python", as for `softrobots.compile`: short chains of joints, inflatable arms among them, in
+            microseconds a case; or "pinocchio": every robot without dry friction, solved from rest as by `solve_equilibrium`,
+            in tenths of a millisecond to milliseconds. By default compiled code where it has derivatives.
+        threads: Number of threads of compiled code.
         failed: What becomes of rows without a stable equilibrium: "raise" raises an error that names them, "nan" makes their
             results NaN and their gradients zero.
 
@@ -42,7 +44,7 @@ def equilibrium(
         values of the parameters loads the robot once more.
 
     Raises:
-        ParameterError: If an argument is invalid, or derivatives of this robot are not compiled.
+        ParameterError: If an argument is invalid, the robot has dry friction, or `backend` has no derivatives of it.
         NameNotFound: If the robot has no such parameter.
         DescriptionError: If the robot cannot be loaded.
         MissingDependency: If PyTorch is not installed.
@@ -63,7 +65,7 @@ def load_estimate(
     """Return the force on the tip that explains the loads on the motors as a function of PyTorch.
 
     Args:
-        robot: See `equilibrium`; with three motor joints at least.
+        robot: See `equilibrium`; with three motor joints at least. Without compiled code exactly three actuators feel loads.
         parameters: See `equilibrium`.
         gravity: See `equilibrium`.
         backend: See `equilibrium`.
@@ -75,7 +77,7 @@ def load_estimate(
         is that of least squares. Shapes as for `equilibrium`, and (..., n_motors) [N m or N] of the loads on the motors.
 
     Raises:
-        ParameterError: If an argument is invalid, or derivatives of this robot are not compiled.
+        ParameterError: If an argument is invalid, the robot has dry friction, or `backend` has no derivatives of it.
         NameNotFound: If the robot has no such parameter.
         DescriptionError: If the robot cannot be loaded.
         MissingDependency: If PyTorch is not installed.

@@ -1,0 +1,261 @@
+r"""Equilibria and load estimates of every robot without dry friction, with the derivatives of those of `sensitivity`.
+
+The counterpart of `number_changes` and compiled code, with the same calls: each row is found as by `solve_equilibrium` or
+`estimate_load`, from rest. Derivatives are the closed forms of `softrobots.identification.residual_derivatives` for many rows
+at once: in reverse one adjoint row a case, whatever the number of parameters; forwards one for each component of the results.
+The numbers of the robot are here its parameters themselves.
+
+A load estimate holds three felt loads `tau` at what was measured by the force `f`:
+
+.. math:: df = \Bigl(\frac{d\tau}{df}\Bigr)^{-1} \Bigl(d\tau - \frac{d\tau}{dq_m} dq_m - \frac{d\tau}{dp} dp\Bigr)
+
+Given lengths leave combinations `y = E z` of the strains `z` free; `E` changes with the parameters, too.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.compiled.run.responses import Cases
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import LoadNotFound, NeutralEquilibrium, ParameterError
+from softrobots.identification.model_change import ModelChange, model_change
+from softrobots.identification.parameters import ParameterSet
+from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
+from softrobots.statics.elastostatics import solve_springs
+from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.load_estimation import estimate_load
+from softrobots.statics.loads import Load
+from softrobots.statics.stability import NEUTRAL, stability
+
+_FINE = 1e-12  # tolerance of equilibria, relative to their load
+_SIZE = 1 << 20  # numbers of the twists of a chunk of cases
+_JUMPS = 1e4  # change of a coefficient of `E` over the relative change of a parameter, above which it jumps
+
+
+class GeneralSolver:
+    """A robot by values of its parameters; see `number_changes.NumberChanges`."""
+
+    def __init__(self, parameters: ParameterSet, *, weight: bool) -> None:
+        """Take the parameters."""
+        self._parameters, self._weight = parameters, weight
+        self._at, self._change = lru_cache(maxsize=16)(self._model), lru_cache(maxsize=4)(self._model_change)
+
+    def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[GeneralResponses, FloatArray, FloatArray]:
+        """Return the solver at values of the parameters, these as its numbers, shape (1, P), and their derivatives.
+
+        Raises:
+            ParameterError: If the robot refuses the values, or has other joints or actuators with them.
+            DescriptionError: If the robot cannot be described with them.
+        """
+        size = len(values)
+        change = self._change(values) if slopes else ModelChange(size, {})
+        sizes = dict(zip(self._parameters.names, values, strict=True))
+        responses = GeneralResponses(self._at(values), change, sizes, self._weight)
+        return responses, np.array(values).reshape(1, size), np.eye(size) if slopes else np.zeros((size, 0))
+
+    def _model(self, values: tuple[float, ...]) -> SoftModel:
+        present = self._parameters.present
+        model = self._parameters.model(values) if np.any(self._parameters.of_model) else present
+        if (model.springs.names, model.n_motors) != (present.springs.names, present.n_motors):
+            raise ParameterError("parameters", values, "values with which the robot has the same joints and actuators")
+        return model
+
+    def _model_change(self, values: tuple[float, ...]) -> ModelChange:
+        return model_change(self._parameters, values)
+
+
+class _Slopes(NamedTuple):
+    """Derivatives of outputs, shapes (N, L, ...)."""
+
+    by_motors: FloatArray
+    by_force: FloatArray
+    by_parameters: FloatArray
+
+
+class GeneralResponses:
+    """Solvers of a robot at values of its parameters; see `softrobots.compiled.run.responses.Responses`."""
+
+    def __init__(self, model: SoftModel, change: ModelChange, values: Mapping[str, float], weight: bool) -> None:
+        self._model, self._change, self._values, self._weight = model, change, values, weight
+
+    def equilibria(
+        self, motors: FloatArray, force: FloatArray, gravity: FloatArray, numbers: FloatArray, threads: int, count: int
+    ) -> list[Any]:
+        """Find equilibria from rest."""
+        model = self._model
+        springs, tips, errors, statuses = self._room(count)
+        for row, (at, push) in enumerate(_rows(count, motors, force)):
+            try:
+                checked = model.checked_motors(at)
+            except ParameterError:
+                statuses[row] = Status.NOT_A_NUMBER
+                continue
+            load = self._load(push, gravity)
+            state, _, stable = solve_springs(model, checked, load, model.rest, tolerance=_FINE)
+            springs[row], tips[row], errors[row] = state.q_springs, self._tip(state.q), state.error
+            if not state.error <= largest_residual(model, state.scale, TOLERANCE):
+                statuses[row] = Status.UNSETTLED
+            elif not stable:
+                kind = stability(model, state.point, state.q, state.tangent).kind
+                statuses[row] = Status.NEUTRAL if kind == NEUTRAL else Status.UNSTABLE
+        return [springs, tips, errors, statuses]
+
+    def estimates(
+        self, motors: FloatArray, torques: FloatArray, gravity: FloatArray, numbers: FloatArray, threads: int, count: int
+    ) -> list[Any]:
+        """Find forces on the tip from the loads on the motors."""
+        springs, tips, errors, statuses = self._room(count)
+        forces = np.zeros((count, 3))
+        for row, (at, felt) in enumerate(_rows(count, motors, torques)):
+            try:
+                found = estimate_load(self._model, at, felt, gravity=gravity if self._weight else None)
+            except ParameterError:
+                statuses[row] = Status.NOT_A_NUMBER
+                continue
+            except (LoadNotFound, NeutralEquilibrium):
+                statuses[row] = Status.NOT_REACHED
+                continue
+            springs[row], tips[row], forces[row] = found.equilibrium.q_springs, found.equilibrium.tip_position, found.force
+            errors[row] = found.residual
+            if len(found.unobservable_directions):
+                statuses[row] = Status.UNOBSERVABLE
+            elif not found.equilibrium.stable:
+                statuses[row] = Status.UNSTABLE
+        return [springs, tips, forces, errors, statuses]
+
+    def pull(
+        self,
+        kind: str,
+        cases: Cases,
+        gravity: FloatArray,
+        numbers: FloatArray,
+        weights: Sequence[FloatArray],
+        threads: int,
+        count: int,
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return weights of motors and load, and of the parameters, summed; see `Responses.pull`."""
+        model = self._model
+        motors, load = np.zeros((count, model.n_motors)), np.zeros((count, 3 if kind == "equilibrium" else model.n_motors))
+        sums = np.zeros(self._change.n_parameters)
+        for rows, at in self._chunks(cases, gravity, count, 1):
+            springs, tips, *forces = (np.broadcast_to(one, (count, one.shape[1]))[rows, None] for one in weights)
+            found = self._of_results(at, springs, tips)
+            if forces:
+                felt = self._felt(at)
+                explained = np.linalg.solve(
+                    np.swapaxes(felt.by_force, 1, 2), np.swapaxes(found.by_force + forces[0], 1, 2)
+                ).swapaxes(1, 2)
+                found = _Slopes(*(one - explained @ other for one, other in zip(found, felt, strict=True)))
+                load[rows, model.actuators.feels] = explained[:, 0]
+            else:
+                load[rows] = found.by_force[:, 0]
+            motors[rows] = found.by_motors[:, 0]
+            sums += found.by_parameters.sum(axis=(0, 1))
+        return motors, load, sums
+
+    def push(
+        self,
+        kind: str,
+        cases: Cases,
+        gravity: FloatArray,
+        numbers: FloatArray,
+        rates: Sequence[FloatArray],
+        threads: int,
+        count: int,
+    ) -> list[FloatArray]:
+        """Return rates of the results from those of motors, load and parameters; see `Responses.push`."""
+        n = self._model.n_springs
+        rows_of_results = np.eye(n + 3)
+        moved = np.zeros((count, n + 6 if kind == "estimate" else n + 3))
+        for rows, at in self._chunks(cases, gravity, count, n + 3):
+            motors, load, parameters = (np.broadcast_to(one, (count, one.shape[1]))[rows, :, None] for one in rates)
+            some = np.broadcast_to(rows_of_results, (len(motors), n + 3, n + 3))
+            found = self._of_results(at, some[..., :n], some[..., n:])
+            force = load
+            if kind == "estimate":
+                felt = self._felt(at)
+                left = load[:, self._model.actuators.feels] - felt.by_motors @ motors - felt.by_parameters @ parameters
+                force = np.asarray(np.linalg.solve(felt.by_force, left), dtype=np.float64)
+                moved[rows, n + 3 :] = force[..., 0]
+            whole = found.by_motors @ motors + found.by_force @ force + found.by_parameters @ parameters
+            moved[rows, : n + 3] = whole[..., 0]
+        return np.split(moved, range(n, moved.shape[1], 3)[: 1 if kind == "equilibrium" else 2], axis=1)
+
+    def _of_results(self, at: EquilibriumDerivatives, springs: FloatArray, tips: FloatArray) -> _Slopes:
+        """Derivatives of weighted elastic coordinates and tips, shapes (N, L, ...)."""
+        held = self._model.structure.muscle_lengths
+        weights: FloatArray = springs if held is None else np.asarray(springs @ held.elastic)
+        pose = np.concatenate([tips, np.zeros_like(tips)], axis=-1)
+        found = self._slopes(at, Outputs(frame=self._model.tip, pose=pose, strains=weights))
+        if held is not None and np.any(springs):
+            self._check_coordinates()
+            turned = self._change.along("held_elastic", springs[..., None] * at.strains[:, None, None])
+            found = found._replace(by_parameters=found.by_parameters + turned)
+        return found
+
+    def _check_coordinates(self) -> None:
+        """Refuse parameters with which the elastic coordinates of given lengths jump, as those of equal sections may."""
+        slopes = self._change.by_number.get("held_elastic", np.zeros((1, len(self._values))))
+        for (name, value), slope in zip(self._values.items(), np.abs(slopes).max(axis=0), strict=True):
+            if slope * abs(value) > _JUMPS:
+                requirement = "a value about which the elastic coordinates do not jump, or gradients of the tip alone"
+                raise ParameterError(name, value, requirement)
+
+    def _felt(self, at: EquilibriumDerivatives) -> _Slopes:
+        """Derivatives of the loads that actuators feel."""
+        weights = np.eye(self._model.n_motors)[self._model.actuators.feels]
+        return self._slopes(at, Outputs(loads=np.tile(weights, (len(at.strains), 1, 1))))
+
+    def _slopes(self, at: EquilibriumDerivatives, outputs: Outputs) -> _Slopes:
+        rows = AdjointRows(at, outputs)
+        return _Slopes(rows.by_actuators, rows.by_loads()[self._model.tip][..., :3], rows.by_numbers(self._change))
+
+    def _chunks(
+        self, cases: Cases, gravity: FloatArray, count: int, outputs: int
+    ) -> Iterator[tuple[slice, EquilibriumDerivatives]]:
+        """Yield some of the cases after another, and the robot at them."""
+        model = self._model
+        step = max(1, _SIZE // (6 * outputs * max(1, model.pinocchio.nv)))
+        motors, force, springs = (
+            np.broadcast_to(one, (count, one.shape[1])) for one in (cases.motors, cases.force, cases.unknown)
+        )
+        for first in range(0, count, step):
+            rows = slice(first, min(first + step, count))
+            states = [
+                elastic_state(model, at, here, self._load(push, gravity))
+                for at, push, here in zip(motors[rows], force[rows], springs[rows], strict=True)
+            ]
+            loads = {model.tip: np.concatenate([force[rows], np.zeros((len(states), 3))], axis=1)}
+            if self._weight:
+                loads[""] = np.tile(gravity, (len(states), 1))
+            of_actuators, coupling = (np.array([getattr(one.load, name) for one in states]) for name in ("motors", "coupling"))
+            tangent = np.array([one.tangent for one in states])
+            yield (
+                rows,
+                EquilibriumDerivatives(model, States(motors[rows], springs[rows], loads, of_actuators, tangent, coupling)),
+            )
+
+    def _load(self, force: FloatArray, gravity: FloatArray) -> Load:
+        wrench = np.concatenate([force, np.zeros(3)])
+        return Load({self._model.tip: wrench}, tuple(gravity.tolist()) if self._weight else None)
+
+    def _tip(self, q: FloatArray) -> FloatArray:
+        return np.array(frame_placement(self._model, q, self._model.tip).translation)
+
+    def _room(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray, Any]:
+        """Arrays for elastic coordinates, tips, errors and statuses."""
+        springs, tips, errors = np.zeros((count, self._model.n_springs)), np.zeros((count, 3)), np.full(count, np.inf)
+        return springs, tips, errors, np.full(count, Status.CERTIFIED)
+
+
+def _rows(count: int, *arrays: FloatArray) -> Iterator[tuple[FloatArray, ...]]:
+    """Yield the rows of arrays of `count` rows, or of one for all."""
+    return zip(*(np.broadcast_to(one, (count, one.shape[1])) for one in arrays), strict=True)

@@ -1,0 +1,206 @@
+"""Derivatives of batches of robots that are no compiled chains: differences of robots that `solve_equilibrium` solves."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any, NamedTuple
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.core.checks import FloatArray
+from softrobots.learning.differentiable import Differentiable
+from softrobots.learning.general_solver import GeneralSolver
+from tests.support.foreign import BRANCHED, SPRINGS
+
+OPTIONS: dict[str, Any] = dict(gravity=sr.EARTH_GRAVITY, backend=None, threads=1, failed="raise")
+STEP = 3e-4
+"""Of differences of fourth order, relative to changes of a hundredth to a tenth; their error is about its fourth power."""
+
+
+class Case(NamedTuple):
+    """A robot, its actuators, their rates, a force, and parameters."""
+
+    robot: Any
+    motors: tuple[float, ...]
+    rate: float
+    force: tuple[float, float, float]
+    names: tuple[str, ...]
+
+
+LENGTHS = (0.28, 0.32, 0.3, 0.26, 0.24, 0.25)
+PCC: dict[str, Any] = {"segment_lengths": (0.3, 0.25), "elastic_sections": 2}
+CASES: Mapping[str, Callable[[], Case]] = {
+    "given lengths": lambda: Case(
+        sr.PccArm(**PCC),
+        LENGTHS,
+        0.01,
+        (0.5, 1.0, -1.0),
+        ("muscle_distance", "segment_lengths[1]", "axial_stiffness", "bending_stiffness", "motor[2].offset"),
+    ),
+    "tensions": lambda: Case(
+        sr.PccArm(**PCC, kind="tension"), (5, 20, 0, 10, 0, 3), 1.0, (0.5, 1.0, -1.0), ("offset[2]", "torsional_stiffness")
+    ),
+    "tendons": lambda: Case(
+        sr.TendonArm(segment_lengths=(0.06, 0.06), elastic_sections=2),
+        (0.058, 0.064, 0.062, 0.12, 0.118, 0.123),  # the second is slack
+        1e-4,
+        (0.2, 0.1, -0.1),
+        ("tendon_pretension", "tendon_stiffness", "tendon_distance", "segment[1].young_modulus", "motor[1].offset"),
+    ),
+    "helix": lambda: Case(
+        sr.HelixTube(length=0.3, elastic_sections=3), (), 0.0, (0.5, 1.0, -1.0), ("contraction", "diameter", "length")
+    ),
+    "side branches": lambda: Case(
+        sr.load_model(BRANCHED, springs=SPRINGS, tip="finger"),
+        (0.3, 0.6, -0.2),
+        0.1,
+        (0.0, 10.0, -11.0),
+        ("joint[*].stiffness", "joint[*].rest"),
+    ),
+    "plateau": lambda: Case(
+        sr.InflatableArm(max_moment=12.0), (0.3, 0.6, -0.8), 0.1, (0.0, 10.0, -11.0), ("max_moment", "link[2].stiffness")
+    ),
+    "winding lengths": lambda: Case(
+        sr.TendonArm(segment_lengths=(0.06, 0.06), elastic_sections=2, kind="length"),
+        (0.06, 0.0605, 0.0598, 0.12, 0.1201, 0.1199),
+        1e-4,
+        (0.2, 0.1, -0.1),
+        ("backbone_radius", "segment_lengths[2]", "tendon_distance"),
+    ),
+}  # fmt: skip
+
+
+def solved(solver: Differentiable, inputs: list[FloatArray], start: Any = None) -> FloatArray:
+    """Elastic coordinates and tip by `solve_equilibrium`."""
+    parameters = solver._set
+    model = parameters.model(inputs[2])
+    motors = inputs[0] + parameters.motor_offsets(inputs[2])
+    found = sr.solve_equilibrium(model, motors, inputs[1], gravity=sr.EARTH_GRAVITY, q_springs0=start, tolerance=1e-13)
+    return np.concatenate([found.q_springs, found.tip_position])
+
+
+def changes(case: Case, solver: Differentiable) -> list[FloatArray]:
+    """A random change of all inputs."""
+    random = np.random.default_rng(11)
+    of_parameters = 0.1 * np.where(solver.present == 0.0, 0.1, solver.present)
+    return [
+        case.rate * random.normal(size=len(case.motors)),
+        random.normal(size=3) * np.abs(case.force).max(),
+        of_parameters * random.choice([-1.0, 1.0], len(of_parameters)),
+    ]
+
+
+LONG = ("tensions", "winding lengths")
+
+
+@pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.study) if one in LONG else one for one in CASES])
+def test_derivatives_are_differences_of_solved_robots(kind: str) -> None:
+    """Along a change of motors, force and parameters at once; reverse mode is the transpose."""
+    case = CASES[kind]()
+    solver = Differentiable("equilibrium", case.robot, case.names, **OPTIONS)
+    assert isinstance(solver._changes, GeneralSolver)
+    one = [np.array(case.motors), np.array(case.force), solver.present]
+    rates = changes(case, solver)
+    near = [one[0] + rates[0], 0.5 * one[1]]
+    inputs = [np.stack([one[0], near[0]]), np.stack([one[1], near[1]]), one[2]]
+    results = solver.solve(*inputs)
+    pushed = np.concatenate(solver.push(inputs, results, rates), axis=1)
+    for row in range(2):
+        at = [inputs[0][row], inputs[1][row], one[2]]
+        assert np.concatenate([part[row] for part in results]) == pytest.approx(solved(solver, at), abs=1e-10)
+        ends = [
+            solved(solver, [a + n * STEP * b for a, b in zip(at, rates, strict=True)], results[0][row]) for n in (-2, -1, 1, 2)
+        ]
+        slope = np.array([1.0, -8.0, 8.0, -1.0]) @ ends / (12.0 * STEP)
+        assert pushed[row] == pytest.approx(slope, abs=1e-8 * (1.0 + np.abs(slope).max()))
+        assert np.abs(slope).max() > 1e-3
+    random = np.random.default_rng(3)
+    weights = [random.normal(size=part.shape) for part in results]
+    pulled = solver.pull(inputs, results, weights, [(2,), (), ()])
+    back = sum(float((np.asarray(a) * b).sum()) for a, b in zip(pulled, rates, strict=True))
+    assert back == pytest.approx(float((np.concatenate(weights, axis=1) * pushed).sum()), rel=1e-10)
+
+
+def test_load_estimates_of_an_arm_with_a_plateau() -> None:
+    """By motors, torques and parameters: differences of estimates, and the transpose."""
+    solver = Differentiable("estimate", sr.InflatableArm(max_moment=12.0), ("max_moment", "link[2].stiffness"), **OPTIONS)
+    motors = np.array([0.3, 0.6, -0.8])
+    felt = sr.solve_equilibrium(solver.model, motors, (2.0, 4.0, -5.0), gravity=sr.EARTH_GRAVITY).motor_torques
+    inputs = [motors, np.array(felt), solver.present]
+    rates = [np.array([0.1, -0.2, 0.1]), np.array([0.3, 0.2, -0.4]), 0.1 * solver.present]
+    results = solver.solve(*inputs)
+    assert results[2] == pytest.approx(np.array([2.0, 4.0, -5.0]), abs=1e-8)
+    pushed = np.concatenate(solver.push(inputs, results, rates))
+    ends = []
+    for number in (-1, 1):
+        motors, torques, values = (a + number * STEP * b for a, b in zip(inputs, rates, strict=True))
+        found = sr.estimate_load(solver._set.model(values), motors, torques, gravity=sr.EARTH_GRAVITY)
+        ends.append(np.concatenate([found.equilibrium.q_springs, found.equilibrium.tip_position, found.force]))
+    slope = (ends[1] - ends[0]) / (2.0 * STEP)
+    assert pushed == pytest.approx(slope, abs=1e-6 * np.abs(slope).max())  # of second order: an estimate takes 0.2 s
+    weights = [np.random.default_rng(5).normal(size=part.shape) for part in results]
+    pulled = solver.pull(inputs, results, weights, [(), (), ()])
+    back = sum(float((np.asarray(a) * b).sum()) for a, b in zip(pulled, rates, strict=True))
+    assert back == pytest.approx(float(np.concatenate(weights) @ pushed), rel=1e-10)
+
+
+def test_rows_without_a_result_are_named_or_marked() -> None:
+    """Lengths that are no numbers, and lengths that no shape has; other rows are as without them."""
+    motors = np.array([LENGTHS, LENGTHS, LENGTHS])
+    motors[1, 2], motors[2, 0] = np.nan, -0.01
+    force = np.array([0.5, 1.0, -1.0])
+    strict, marking = (
+        Differentiable("equilibrium", sr.PccArm(**PCC), "muscle_distance", **OPTIONS | {"failed": failed})
+        for failed in ("raise", "nan")
+    )
+    with pytest.raises(sr.EquilibriumNotFound, match=r"1 of 2 rows.*row 1.*lengths that no shape has"):
+        strict.solve(motors[::2], force, strict.present)
+    results, alone = marking.solve(motors, force, marking.present), strict.solve(motors[:1], force, strict.present)
+    weights = [np.ones_like(one) for one in results]
+    found = marking.pull([motors, force, marking.present], results, weights, [(3,), (3,), ()])
+    expected = strict.pull([motors[:1], force, strict.present], alone, [one[:1] for one in weights], [(1,), (1,), ()])
+    for a, b in zip((*results, *found[:2]), (*alone, *expected[:2]), strict=True):
+        assert np.array_equal(np.asarray(a)[:1], b)
+    assert np.isnan(results[1][1:]).all()
+    assert np.array_equal(np.asarray(found[0])[1:], np.zeros((2, 6)))
+    assert np.array_equal(found[2], expected[2])
+    assert np.isnan(marking.push([motors, force, marking.present], results, [None, np.ones(3), None])[0][1:]).all()
+    nothing = marking.solve(motors[1:], force, marking.present)  # not one of them
+    weights = [np.ones_like(one) for one in nothing]
+    assert np.array_equal(marking.pull([motors[1:], force, marking.present], nothing, weights, [None, None, ()])[2], [0.0])
+
+
+def test_the_general_back_end_agrees_with_compiled_code() -> None:
+    """Results and gradients of a chain that is compiled unless another back end is asked for."""
+    motors, force = np.array([[0.1, 0.2, 0.3], [0.4, 0.5, -0.6]]), np.array([1.0, 2.0, -3.0])
+    solvers = [
+        Differentiable("equilibrium", sr.InflatableArm(), ("stiffness", "motor[1].offset"), **OPTIONS | {"backend": backend})
+        for backend in ("python", "pinocchio")
+    ]
+    found = []
+    for solver in solvers:
+        results = solver.solve(motors, force, solver.present)
+        weights = [np.ones_like(one) for one in results]
+        found.append([*results, *solver.pull([motors, force, solver.present], results, weights, [(2,), (), ()])])
+    for a, b in zip(*found, strict=True):
+        assert a == pytest.approx(b, abs=1e-9)
+
+
+def test_what_has_no_derivatives_is_refused_by_name() -> None:
+    with pytest.raises(sr.ParameterError, match="dry friction"):
+        Differentiable("equilibrium", sr.TendonArm(bending_friction=0.001), (), **OPTIONS)
+    with pytest.raises(sr.ParameterError, match=r"pcc_arm.*three actuators feel the load \(6 do\)"):
+        Differentiable("estimate", sr.PccArm(**PCC), (), **OPTIONS)
+    hinges = sr.PccArm(segment_lengths=(0.3,), chain="lumped", hinges=3)
+    solver = Differentiable("equilibrium", hinges, "joint[section_1_1_bend_x].stiffness", **OPTIONS)
+    inputs = [solver.model.relaxed_motors + [0.01, -0.01, 0.0], np.array([0.5, 1.0, -1.0]), solver.present]
+    results = solver.solve(*inputs)
+    with pytest.raises(sr.ParameterError, match="about which the elastic coordinates do not jump"):
+        solver.pull(inputs, results, [np.ones_like(one) for one in results], [None, None, ()])
+    tips = [np.zeros_like(results[0]), np.ones_like(results[1])]
+    step = 1e-3 * solver.present
+    ends = [solver.solve(*inputs[:2], solver.present + n * step)[1].sum() for n in (-2, -1, 1, 2)]
+    slope = np.array([1.0, -8.0, 8.0, -1.0]) @ ends / (12.0 * step)
+    assert solver.pull(inputs, results, tips, [None, None, ()])[2] == pytest.approx(slope, rel=1e-6)
