@@ -523,6 +523,7 @@ def test_defaults_are_those_of_the_robots(answer) -> None:
 # --- softrobots bench
 
 
+@pytest.mark.study
 def test_bench_times_every_job_and_writes_what_it_prints(told, tmp_path: Path) -> None:
     file = tmp_path / "bench.json"
     words = ["bench", "--quick", "--rounds", "2", "-o", str(file)]

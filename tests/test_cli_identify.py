@@ -157,6 +157,7 @@ def test_errors_are_told_also_without_their_mean(folder: Path, told: Told) -> No
     assert "times the standard deviation that was given" in report
 
 
+@pytest.mark.study
 @each_row(("message", "status"), [(INTERRUPTED, 130), ("at most 100 steps", 1)])
 def test_a_fit_that_ends_early_is_kept(
     message: str, status: int, folder: Path, told: Told, monkeypatch: pytest.MonkeyPatch

@@ -216,6 +216,7 @@ def test_unknown_noise_is_found_from_the_residuals(noisy: sr.Measurements) -> No
     assert told.fitted.errors["positions.tip"][0] == pytest.approx(np.sqrt(3) * 1e-3, rel=0.2)
 
 
+@pytest.mark.study
 def test_a_robust_loss_is_not_led_by_outliers_and_tells_them(noisy: sr.Measurements) -> None:
     arguments = noisy.arguments() | {"std": {"positions.tip": 1e-3}}
     tips = np.array(arguments["positions"]["tip"])
@@ -299,6 +300,7 @@ def test_rows_kept_aside_are_told_apart(noisy: sr.Measurements) -> None:
     np.testing.assert_array_equal(sr.identify(FOREIGN, masked, names).solution, by_mask.solution)
 
 
+@pytest.mark.study
 def test_the_best_of_several_starts_counts(noisy: sr.Measurements) -> None:
     one, several = (sr.identify(FOREIGN, noisy, LINKS, starts=starts, seed=2) for starts in (1, 3))
     np.testing.assert_allclose(one.solution, several.solution, rtol=1e-4)

@@ -13,6 +13,8 @@ from softrobots.core.errors import SoftRobotsError
 EXTRAS = {
     "plot": "plots: --plot, the figures of scripts",
     "fast": "compiled solvers by numba",
+    "jax": "derivatives in JAX: softrobots.jax",
+    "torch": "derivatives in PyTorch: softrobots.torch",
     "control": "linear models as state spaces of python-control",
     "viser": "sliders in the browser: softrobots view ROBOT --sliders",
     "pictures": "pictures of the browser view",
