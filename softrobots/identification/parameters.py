@@ -31,7 +31,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.identification.parameter_names import Kind, Parameter, Registry
-from softrobots.model.loader import load_model, with_springs
+from softrobots.model.loader import load_arguments, load_model, with_springs
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import AssumedStiffnessWarning
 from softrobots.robots.variants import Variants
@@ -146,7 +146,7 @@ class ParameterSet:
             DescriptionError: If the robot with these values cannot be described, e.g. with parts too light.
         """
         robot = self.robot(values)
-        model = self.present if robot is self.present.robot else load_model(robot, **self._told)
+        model = self.present if robot is self.present.robot else load_model(robot, **self._load_arguments)
         springs = dict(model.spring_table)
         for number, one in self.places("spring"):
             for joint in one.place.names:
@@ -171,10 +171,15 @@ class ParameterSet:
 
     def motor_offsets(self, values: FloatArray) -> FloatArray:
         """Return true minus commanded actuator coordinates, shape (n_motors,) [rad, m, N or Pa]."""
-        offsets = np.zeros(self.present.n_motors)
+        return np.asarray(self.offset_slopes @ values)
+
+    @cached_property
+    def offset_slopes(self) -> FloatArray:
+        """Derivative of the actuators by the parameters: 1 where one is their offset, else 0, shape (n_motors, P)."""
+        slopes = np.zeros((self.present.n_motors, len(self.parameters)))
         for number, one in self.places("offset"):
-            offsets[list(one.place.parts)] += values[number]
-        return offsets
+            slopes[list(one.place.parts), number] = 1.0
+        return read_only(slopes)
 
     @cached_property
     def _entries(self) -> dict[tuple[str, int | None], int]:
@@ -191,13 +196,12 @@ class ParameterSet:
             return Variants(replace(self.present.robot, **rows), list(self._entries))
 
     @cached_property
-    def _told(self) -> dict[str, Any]:
+    def _load_arguments(self) -> dict[str, Any]:
         """Arguments of `load_model` with which the present robot was loaded."""
         model = self.present
         given: dict[str, Any] = dict.fromkeys(name for name in model.structure.tags.springs if name not in model.spring_table)
         given |= {name: model.spring_table[name] for name, role in model.joint_roles.items() if role == "given spring"}
-        told = {"motors": model.structure.motor_joints, "tip": model.tip, "muscles": model.muscle_input}
-        return told | {"springs": given or None}
+        return load_arguments(model) | {"springs": given or None}
 
     def _check(self) -> None:
         """Refuse numbers that are named twice, and present values that the robot refuses."""
@@ -215,17 +219,7 @@ class ParameterSet:
         if len(set(self.names)) < len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise ParameterError("parameters", twice, "named once")
-        row: Any
-        fields: dict[str, Any] = {}
-        for number, one in self.places("field"):  # without a tape, which a list of names does not need
-            row = fields.setdefault(one.place.names[0], list(one.place.row))
-            for part in one.place.parts:
-                row[part] = self.values[number]
-            if not one.place.parts:
-                fields[one.place.names[0]] = self.values[number]
-        if fields:
+        if self._entries:  # without a URDF text, which a list of names does not need
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", AssumedStiffnessWarning)
-                replace(
-                    self.present.robot, **{name: tuple(row) if isinstance(row, list) else row for name, row in fields.items()}
-                )
+                self._variants.changed(self.values[list(self._entries.values())])

@@ -176,11 +176,8 @@ class Predictor:
         """Whether derivatives are differences of the whole course."""
         self.change = ModelChange(len(parameters.names), {})
         """Derivatives of the model's numbers, as `refresh` left them."""
-        self.actuator_slopes: FloatArray = np.zeros((parameters.present.n_motors, len(parameters.names)))
+        self.actuator_slopes = parameters.offset_slopes
         """Derivatives of the actuators by the parameters, shape (n_motors, P)."""
-        for number, one in parameters.places("offset"):
-            self.actuator_slopes[list(one.place.parts), number] = 1.0
-        self._offsets = self.actuator_slopes.copy()
         self._springs: FloatArray | None = None
         self._last: Prediction | None = None
         self._kept: tuple[Mapping[str, FloatArray], list[Load]] | None = None
@@ -194,10 +191,10 @@ class Predictor:
         if self.by_differences:
             return
         self.change = model_change(self.parameters, values)
-        self.actuator_slopes = self._offsets.copy()
+        self.actuator_slopes = self.parameters.offset_slopes
         if self.measurements.relative and "laws" in self.change.by_number:
             laws = self.change.by_number["laws"].reshape(-1, len(LAW), len(values))
-            self.actuator_slopes += laws[:, LAW.index("rest_length")]
+            self.actuator_slopes = self.actuator_slopes + laws[:, LAW.index("rest_length")]
 
     def at(self, values: FloatArray) -> Prediction:
         """Return the rows at given values, shape (P,).

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from functools import cached_property
 from typing import Any, Literal
 
 import numpy as np
@@ -133,7 +132,7 @@ class Differentiable:
         given = [np.zeros(size) if rate is None else rate for size, rate in zip(self.inputs, rates, strict=True)]
         lead = _lead([*inputs, *results, *given])
         of_motors, of_load, of_parameters = (_flat(one, lead) for one in given)
-        of_motors = of_motors + of_parameters @ self._offsets.T
+        of_motors = of_motors + of_parameters @ self._set.offset_slopes.T
         found = _Parts(math.prod(lead), np.nan)
         for rows, count, values, cases in self._cases(inputs, results, lead):
             code, numbers, slopes = self._changes.code(values, slopes=rates[2] is not None)
@@ -173,20 +172,14 @@ class Differentiable:
             *pulled, of_numbers = code.pull(self.kind, cases, self._gravity, numbers, picked, self._threads, count)
             found.put(rows, pulled)
             if shapes[2] is not None:
-                by_group[group] = of_numbers @ slopes + pulled[0].sum(axis=0) @ self._offsets
+                by_group[group] = of_numbers @ slopes + pulled[0].sum(axis=0) @ self._set.offset_slopes
         wide = [*(one.reshape(*lead, -1) for one in found.arrays), sums]
         return tuple(
             None if shape is None else _summed(one, (*shape, one.shape[-1])) for one, shape in zip(wide, shapes, strict=True)
         )
 
-    @cached_property
-    def _offsets(self) -> FloatArray:
-        """Derivative of the true motor coordinates by the parameters, shape (n_motors, P)."""
-        columns = [self._set.motor_offsets(row) for row in np.eye(len(self.present))]
-        return np.ascontiguousarray(np.reshape(columns, (len(columns), self.model.n_motors)).T)
-
     def _true(self, motors: FloatArray, values: tuple[float, ...]) -> FloatArray:
-        offsets = self._offsets @ np.array(values)
+        offsets = self._set.motor_offsets(np.array(values))
         return motors + offsets if np.any(offsets) else motors
 
     def _cases(

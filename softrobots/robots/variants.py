@@ -77,12 +77,20 @@ class Variants:
             ParameterError: If there are more or fewer numbers, or the robot refuses one.
             DescriptionError: If xacro refuses them.
         """
+        robot = self.changed(values)
+        object.__setattr__(robot, "_text", self._text(robot))
+        return robot
+
+    def changed(self, values: Sequence[float] | FloatArray) -> Any:
+        """Return the robot with other numbers, equal to `robot(values)`, without its URDF text.
+
+        Raises:
+            ParameterError: If there are more or fewer numbers, or the robot refuses one.
+        """
         given = finite_array("values", values, (len(self._paths),)).tolist()
         raw = self._with(self.base, given)
         fields = {path[0]: getattr(raw, path[0]) for path in self._paths}
-        robot = dataclasses.replace(self.base, **{name: _checked(value) for name, value in fields.items()})
-        object.__setattr__(robot, "_text", self._text(robot))
-        return robot
+        return dataclasses.replace(self.base, **{name: _checked(value) for name, value in fields.items()})
 
     def urdf(self, values: Sequence[float] | FloatArray) -> str:
         """Return the URDF text of `robot(values)`; raises the same errors."""
