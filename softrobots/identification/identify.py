@@ -208,9 +208,9 @@ def prior_of(chosen: ParameterSet, priors: Mapping[str, tuple[Any, Any]]) -> Pri
     means: list[float] = []
     stds: list[float] = []
     for name, pair in dict(priors).items():
-        members = chosen.asked.get(name, (name,))
+        members = chosen.members.get(name, (name,))
         if not set(members) <= set(chosen.names):
-            raise NameNotFound("fitted parameter", str(name), dict.fromkeys([*chosen.asked, *chosen.names]))
+            raise NameNotFound("fitted parameter", str(name), dict.fromkeys([*chosen.members, *chosen.names]))
         if not isinstance(pair, tuple | list) or len(pair) != 2:
             raise ParameterError(f"priors[{name!r}]", pair, "a pair: mean and standard deviation")
         mean, std = (

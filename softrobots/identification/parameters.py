@@ -50,7 +50,7 @@ class ParameterSet:
     """The scalar parameters."""
     markers: Mapping[str, str]
     """Frame of each marker."""
-    asked: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    members: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
     """Names of the scalars by each name that was asked for."""
 
     @classmethod
@@ -81,8 +81,8 @@ class ParameterSet:
         each = {name.strip(): registry.find(name.strip()) for name in listed}
         if len(each) < len(listed):
             raise ParameterError("parameters", names, "names that are there once")
-        asked = {name: tuple(one.name for one in some) for name, some in each.items()}
-        found = cls(model, tuple(one for some in each.values() for one in some), marked, asked)
+        members = {name: tuple(one.name for one in some) for name, some in each.items()}
+        found = cls(model, tuple(one for some in each.values() for one in some), marked, members)
         found._check()
         return found
 

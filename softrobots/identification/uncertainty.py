@@ -24,7 +24,7 @@ UNDETERMINED = 1e-7
 is not determined: well above the error of a Jacobian by differences (1e-9), well below what noise leaves useful."""
 
 _PARTAKES = 1e-4  # component of a parameter in an undetermined combination of norm 1 above which it is undetermined, too
-_TOLD = np.array([0.5, 1.0])  # standard error of a logarithm up to which it tells the lower, and the upper end of an interval
+_LARGEST_STD = np.array([0.5, 1.0])  # of a logarithm that tells the lower, and the upper end of an interval
 _ALONE = 1e-9  # 1 minus the leverage below which a row, or a block, determines a combination alone
 
 
@@ -68,10 +68,10 @@ class Uncertainty:
 
         margin = stdtrit(self.freedoms, 0.5 + 0.5 * confidence) * self.std[:, None] * np.array([-1.0, 1.0])
         middle, ratio = np.asarray(values, dtype=np.float64)[:, None], np.reshape(logarithmic, (-1, 1))
-        told = ratio & (self.std[:, None] <= _TOLD)
+        by_logarithm = ratio & (self.std[:, None] <= _LARGEST_STD)
         ends = middle + np.where(ratio & (middle != 0.0), np.abs(middle), 1.0) * margin
         ends = np.where(ratio, np.maximum(ends, 0.0), ends)
-        return np.asarray(np.where(told, middle * np.exp(np.where(told, margin, 0.0)), ends))
+        return np.asarray(np.where(by_logarithm, middle * np.exp(np.where(by_logarithm, margin, 0.0)), ends))
 
 
 def uncertainty_from_rows(jacobian: Any, residuals: Any, *, prior: Any = 0.0, std_known: bool = True) -> Uncertainty:

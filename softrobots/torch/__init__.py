@@ -87,8 +87,6 @@ def load_estimate(
 
 
 def _function(kind: Kind, robot: Any, parameters: str | Sequence[str], options: dict[str, Any]) -> Callable[..., Any]:
-    try:
+    with MissingDependency.of_imports("torch", "torch"):
         from softrobots.torch.operation import Function
-    except ImportError as error:
-        raise MissingDependency("torch", "torch") from error
     return Function(Differentiable(kind, robot, parameters, **options))

@@ -77,6 +77,17 @@ def new_plot(size: tuple[float, float], **texts: str) -> tuple[Any, Any]:
     return figure, axes
 
 
+def new_panels(count: int, width: float, height: float, margin: float) -> tuple[Any, Any]:
+    """Return a figure of panels of a size in inches, at most three abreast, with a margin, and their axes; one at least."""
+    across = min(max(count, 1), 3)
+    down = -(-max(count, 1) // across)
+    figure = new_figure((max(width * across, 4.0), margin + height * down))
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    for axes in panels[count:]:
+        axes.axis("off")
+    return figure, panels
+
+
 def new_space(size: tuple[float, float], title: str) -> tuple[Any, Any]:
     """Return a figure of a size in inches with axes in space, in metres, and its axes."""
     figure = new_figure(size)

@@ -13,7 +13,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, instance_of
 from softrobots.identification.identification import UNITS, Comparison, Identification
 from softrobots.identification.uncertainty import CONFIDENCE, Uncertainty
-from softrobots.view.figures.canvas import COLOURS, MARKERS, grid_and_legend, new_figure, new_plot, plain_words
+from softrobots.view.figures.canvas import COLOURS, MARKERS, grid_and_legend, new_figure, new_panels, new_plot, plain_words
 
 _MOST_PANELS = 12  # panels of predicted against measured
 _MOST_PAIRS = 6  # confidence ellipses
@@ -105,10 +105,7 @@ def predicted(result: Identification) -> Any:
         if part.unit != "rad"
         for number in range(len(part.axes))
     ][:_MOST_PANELS]
-    across = min(len(panels), 3)
-    down = -(-len(panels) // across)
-    figure = new_figure((max(2.7 * across, 4.0), 0.7 + 2.7 * down))
-    grid = figure.subplots(down, across, squeeze=False).ravel()
+    figure, grid = new_panels(len(panels), 2.7, 2.7, 0.7)
     for axes, (key, part, number) in zip(grid, panels, strict=False):
         shown = [_numbers(one, key)[:, :, number] for one in (result.fitted, result.validation) if one is not None]
         every = np.concatenate(shown, axis=None)
@@ -121,8 +118,6 @@ def predicted(result: Identification) -> Any:
         axes.title.set_fontsize(10)
         axes.grid(alpha=0.3)
         axes.set_aspect("equal", adjustable="datalim")
-    for axes in grid[len(panels) :]:
-        axes.axis("off")
     if result.validation is not None:
         figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=2, fontsize=10)
     return figure
@@ -227,10 +222,7 @@ def ellipses(result: Identification) -> Any:
     size = np.where(free, np.abs(rows.correlation), -1.0)
     order = np.argsort(-size, axis=None, kind="stable")[: min(_MOST_PAIRS, int(free.sum()))]
     pairs = [(int(i), int(j)) for i, j in zip(*np.unravel_index(order, size.shape), strict=True)]
-    across = min(len(pairs), 3)
-    down = -(-len(pairs) // max(across, 1))
-    figure = new_figure((max(3.2 * across, 4.0), 0.6 + 3.0 * down))
-    grid = figure.subplots(down, max(across, 1), squeeze=False).ravel()
+    figure, grid = new_panels(len(pairs), 3.2, 3.0, 0.6)
     for axes, pair in zip(grid, pairs, strict=False):
         for one, colour, style, label in ((rows, COLOURS[0], "-", "rows"), (blocks, COLOURS[1], "--", "blocks")):
             if one is not None and one.determined[list(pair)].all():
@@ -242,8 +234,6 @@ def ellipses(result: Identification) -> Any:
         axes.set_title(f"correlation {rows.correlation[pair]:.2f}", fontsize=10)
         axes.locator_params(nbins=4)
         axes.grid(alpha=0.3)
-    for axes in grid[len(pairs) :]:
-        axes.axis("off")
     figure.legend(*grid[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=10)
     return figure
 
