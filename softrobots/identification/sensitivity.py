@@ -226,7 +226,7 @@ def sensitivity(
     By implicit differentiation at the state (`softrobots.identification.residual_derivatives`): exact to 1e-8, without solving
     for another equilibrium. The first call for a robot and names loads two robots for each name, which is kept. After that a
     `gradient` takes as long as 1.5 equilibria of an arm and half of one of a tendon arm, whatever the number of parameters; of
-    a new equilibrium of an arm, with all that is prepared for it, 2.5.
+    a new equilibrium of an arm, with all that is prepared for it, as long as three.
 
     At a knee (the end of a plateau, a tendon that goes slack) they are the derivatives of the side that the state is on.
     Friction of sections that bend slips or sticks as it does, and what it remembers stays.
