@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import contextlib
+from typing import NamedTuple
 
 import numpy as np
 
@@ -14,6 +15,8 @@ from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_jacobian
+
+_DEPENDENT = 1e-9  # least singular value of gradients over the largest that counts as independent
 
 
 def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
@@ -105,3 +108,57 @@ def inverse_stiffness(model: SoftModel, tangent: FloatArray) -> FloatArray:
         if squared < POSITIVE**-2 or np.linalg.norm(scaled(inverse, 1.0 / stiffness), 2) < 1.0 / POSITIVE:
             return inverse
     raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has no derivative")
+
+
+class ContactInverse(NamedTuple):
+    """Inverse of the equations of an equilibrium in contact, see `inverse_in_contact`."""
+
+    springs_by_load: FloatArray
+    """Springs by a load on them, `Z (Z^T K Z)^-1 Z^T`, shape (n_springs, n_springs)."""
+    springs_by_gap: FloatArray
+    """Springs by gaps that the springs must open, shape (n_springs, k)."""
+    forces_by_load: FloatArray
+    """Normal forces by a load on the springs, shape (k, n_springs)."""
+    forces_by_gap: FloatArray
+    """Normal forces by gaps that the springs must open, shape (k, k) [N/m]."""
+
+
+def inverse_in_contact(model: SoftModel, tangent: FloatArray, gradients: FloatArray) -> ContactInverse:
+    r"""Return the inverse of the equations of an equilibrium while its pressed contacts stay pressed.
+
+    With the Hessian of the Lagrangian `K` and the gradients `G` of the pressed gaps, springs and normal forces follow a load
+    :math:`b` on the springs and gaps :math:`c` that the springs must open by
+
+    .. math:: \begin{pmatrix} K & G^T \\ G & 0 \end{pmatrix} \begin{pmatrix} \delta y \\ -\delta\lambda \end{pmatrix} =
+       \begin{pmatrix} b \\ c \end{pmatrix}, \qquad \delta y = Z (Z^T K Z)^{-1} Z^T b + N c
+
+    with an orthonormal basis `Z` of the null space of `G` (Nocedal and Wright, Numerical Optimization, 2006, section 16.2), in
+    coordinates in which the springs have stiffness 1. A touch without force is left out of `G`: there derivatives are those on
+    the side where it opens. Where gradients depend on each other the forces are those of least norm.
+
+    Args:
+        model: The robot.
+        tangent: Hessian of the Lagrangian, shape (n_springs, n_springs).
+        gradients: Derivatives of the pressed gaps by the springs, shape (k, n_springs).
+
+    Returns:
+        The inverse.
+
+    Raises:
+        NeutralEquilibrium: If the stiffness on the null space is singular, by the measure of `inverse_stiffness`.
+    """
+    soft = 1.0 / np.sqrt(model.stiffness)
+    with one_blas_thread(len(tangent)):
+        left, sizes, right = np.linalg.svd(gradients * soft)
+        rank = int(np.sum(sizes > _DEPENDENT * sizes.max(initial=0.0)))
+        held, free = right[:rank].T, right[rank:].T
+        opens = held @ (left[:, :rank] / sizes[:rank]).T  # pseudo-inverse of the gradients
+        relative = scaled(tangent, model.stiffness)
+        reduced = free.T @ relative @ free
+        if np.linalg.svd(reduced, compute_uv=False).min(initial=np.inf) <= POSITIVE:
+            raise NeutralEquilibrium("the stiffness beside the contacts is singular: a neutral equilibrium has no derivative")
+        inside = free @ np.linalg.solve(reduced, free.T)
+        moved = opens - inside @ (relative @ opens)
+        pressed = (opens.T @ relative) @ inside - opens.T
+        by_springs = soft[:, None]
+        return ContactInverse(by_springs * inside * soft, by_springs * moved, pressed * soft, opens.T @ relative @ moved)

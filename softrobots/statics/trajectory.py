@@ -3,28 +3,24 @@
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Iterable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
-from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
-from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
+from softrobots.core.errors import ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
-from softrobots.model.friction_coordinates import after_step, untouched
+from softrobots.model.friction_coordinates import untouched
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
-from softrobots.statics.elastostatics import solve_springs
-from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
-from softrobots.statics.inverse_kinematics import IkSolution, solve_ik, start_motors
-from softrobots.statics.kinematics import frame_jacobian, frame_placement
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.inverse_kinematics import solve_ik, start_motors
 from softrobots.statics.loads import Load
-from softrobots.statics.spherical_wrist import NEAR_SINGULAR, spherical_wrist
 from softrobots.statics.tip_goal import Goal, LoadedTip
-from softrobots.statics.tip_search import POSITION_TOLERANCE, LocalSolution, advance
+from softrobots.statics.tip_path.closed_loop import paper_steps
+from softrobots.statics.tip_path.waypoints import exact_steps, named
+from softrobots.statics.tip_search import POSITION_TOLERANCE
 
 METHODS = ("newton", "fixed_point", "paper")
 """Methods of `follow_trajectory`: exact steps with the springs by Newton or by the recursion of [Troise 2021], or the
@@ -193,13 +189,13 @@ def follow_trajectory(
     try:
         begin = solve_ik(model, points[0], q_motors0=q_motors0, elbow=elbow, **options)
     except TargetUnreachable as error:
-        raise _named(error, 1, len(points)) from error
+        raise named(error, 1, len(points)) from error
 
     def follow_from(first: Equilibrium) -> Trajectory:
         steps = (
-            _paper_steps(model, points, moments, load, first, gain)
+            paper_steps(model, points, moments, load, first, gain)
             if method == "paper"
-            else _exact_steps(LoadedTip(model, goals[0], load, inner), goals, first, tolerance, allow_jumps)
+            else exact_steps(LoadedTip(model, goals[0], load, inner), goals, first, tolerance, allow_jumps)
         )
         bar = with_progress(steps, progress, label=f"waypoints ({method})", unit="wp", total=len(points) - 1)
         return Trajectory(read_only(moments), read_only(points), (first, *bar), method, orientations)
@@ -213,86 +209,3 @@ def follow_trajectory(
             with contextlib.suppress(TargetUnreachable):
                 return follow_from(solve_ik(model, points[0], q_motors0=motors, starts=1, **options).equilibrium)
         raise
-
-
-def _named(error: TargetUnreachable, number: int, total: int) -> TargetUnreachable:
-    """Return the error with the number of its waypoint, counted from 1."""
-    message = f"waypoint {number} of {total}: {error}"
-    return TargetUnreachable(message, best=error.best, residual=error.residual, iterations=error.iterations)
-
-
-def _exact_steps(
-    tip: LoadedTip, goals: list[Goal], first: Equilibrium, tolerance: float, allow_jumps: bool
-) -> Iterable[Equilibrium]:
-    model, load, method = tip.model, tip.load, tip.method
-    here = LocalSolution(first.q_motors, elastic_state(first.model, first.q_motors, first.q_springs, load), 0.0)
-    tip = replace(tip, model=after_step(first.model, first.q_motors, first.q_springs))
-    for number, (last, target) in enumerate(pairwise(goals), start=2):
-        reached = advance(tip, last, target, here, tolerance)
-        if reached is None:
-            try:
-                reached = _jump(tip, target, here.q_motors, tolerance)
-            except TargetUnreachable as error:
-                raise _named(error, number, len(goals)) from error
-            if not allow_jumps and model.structure.friction is None:  # friction holds the tip while motors move
-                apart = reached.q_motors - here.q_motors
-                wrist = spherical_wrist(model) if target.rotation is not None else None
-                singular = None if wrist is None else wrist.singularity(here.state.q, NEAR_SINGULAR)
-                solution = equilibrium_from_state(model, reached.q_motors, load, reached.state, method=method, iterations=0)
-                units = ", ".join(dict.fromkeys(model.actuators.units))
-                raise TargetUnreachable(
-                    f"waypoint {number} of {len(goals)}: no continuous motion reaches it from the previous one; the nearest "
-                    f"solution is a jump of the motors by {apart.round(4).tolist()} {units} (allow_jumps=True takes it)"
-                    + (f"; {singular}" if singular else ""),
-                    best=IkSolution(
-                        target.position, target.rotation, solution, reached.error, reached.angle, reached.iterations, ()
-                    ),
-                    residual=reached.error,
-                    iterations=reached.iterations,
-                )
-        here = reached
-        found = equilibrium_from_state(tip.model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
-        tip = replace(tip, model=after_step(found.model, found.q_motors, found.q_springs))
-        yield found
-
-
-def _jump(tip: LoadedTip, target: Goal, start: FloatArray, tolerance: float) -> LocalSolution[ElasticState]:
-    """Solution for a waypoint from any start, where the path from the previous one is blocked."""
-    model, load = tip.model, tip.load
-    options: dict[str, Any] = {"wrench": dict(load.wrenches), "gravity": load.gravity, "tolerance": tolerance}
-    ik = solve_ik(model, target.position, orientation=target.rotation, q_motors0=start, method=tip.method, **options)
-    state = elastic_state(model, ik.q_motors, ik.equilibrium.q_springs, load)
-    return LocalSolution(ik.q_motors, state, ik.error, ik.orientation_error, ik.iterations)
-
-
-def _paper_steps(
-    model: SoftModel, points: FloatArray, times: FloatArray, load: Load, first: Equilibrium, gain: float
-) -> Iterable[Equilibrium]:
-    """Closed-loop inverse kinematics, explicit Euler, [Troise 2021] (8, 9) with the three position rows of the Jacobian."""
-    motors, springs, q = np.array(first.q_motors), np.array(first.q_springs), first.q
-    for number in range(1, len(points)):
-        interval = times[number] - times[number - 1]
-        velocity = (points[number] - points[number - 1]) / interval
-        parts = max(1, int(np.ceil(2.0 * gain * interval - 1e-9)))  # explicit Euler is unstable at gain times step > 2
-        spent = 0
-        for part in range(parts):
-            wanted = points[number - 1] + (part / parts) * (points[number] - points[number - 1])
-            error = wanted - frame_placement(model, q, model.tip).translation
-            point = model.coordinates.at(motors, springs)
-            by_motors, by_springs = point.columns(frame_jacobian(model, q, model.tip)[:3])
-            inverse = np.linalg.pinv(np.concatenate([by_motors, by_springs], axis=1))
-            motors = motors + interval / parts * (inverse[: model.n_motors] @ (velocity + gain * error))
-            motors = np.clip(motors, *model.motor_limits.T)
-            state, used, _ = solve_springs(model, motors, load, springs, method="fixed_point", max_iterations=1000)
-            spent += used
-            if state.error > largest_residual(model, state.scale, TOLERANCE):
-                best = equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
-                raise EquilibriumNotFound(
-                    f"waypoint {number + 1} of {len(points)}: the fixed point of method='paper' does not converge in {used} "
-                    f"steps (residual {best.residual:.3g} N m)",
-                    best=best,
-                    residual=best.residual,
-                    iterations=spent,
-                )
-            springs, q = np.array(state.q_springs), state.q
-        yield equilibrium_from_state(model, motors, load, state, method="fixed_point", iterations=spent)
