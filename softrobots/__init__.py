@@ -50,14 +50,14 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import SpringGroup
 from softrobots.robots import ROBOTS, AssumedStiffnessWarning, HelixTube, InflatableArm, PccArm, Route, TendonArm
 from softrobots.robots.growth import grown_coordinates
-from softrobots.statics.critical_load import critical_load
+from softrobots.statics.buckling.critical_load import critical_load
+from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
+from softrobots.statics.buckling.post_buckling import post_buckling_branches
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
-from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate, estimate_load
 from softrobots.statics.loads import EARTH_GRAVITY, distributed_force
-from softrobots.statics.post_buckling import post_buckling_branches
 from softrobots.statics.sensitivity import compliance, elastostatic_jacobian
 from softrobots.statics.stability import Stability
 from softrobots.statics.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints

@@ -26,7 +26,7 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
     code = "import softrobots, sys; print(*sys.modules)"
     loaded = set(subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout.split())
     assert "pinocchio" in loaded
-    heavy = {"yourdfpy", "meshcat", "matplotlib", "numba", "scipy", "trimesh", "xacro", "tornado", "tqdm"}
+    heavy = {"yourdfpy", "meshcat", "matplotlib", "numba", "scipy", "trimesh", "xacro", "tornado", "tqdm", "daqp"}
     heavy |= {"mujoco", "pydrake", "pybullet", "urchin", "ikpy", "roboticstoolbox", "viser", "distributed", "dask"}
     heavy |= {"playwright", "PIL", "shtab", "IPython", "example_robot_data", "control", "jax", "torch"}
     assert not loaded & (heavy | {"urllib.request"})  # brings http, ssl and email along, an eighth of the whole
@@ -108,7 +108,8 @@ ROOMS = {
 """Every folder of the package, and the rooms that it may import."""
 TO_CODE = ("trace", "chain", "routes", "drivers", "program", "c", "run", "sweeps")
 """Folders of `compiled/` in the order in which a robot becomes code; each imports only those before it."""
-SOLVERS = "trajectory load_estimation imposed_displacement critical_load stability workspace post_buckling sensitivity"
+SOLVERS = "trajectory load_estimation imposed_displacement buckling.critical_load stability workspace buckling.post_buckling"
+SOLVERS += " sensitivity"
 LOADING = "softrobots.model.loader softrobots.description.tag_reader softrobots.description.sources"
 SEPARATE = {
     " ".join(f"softrobots.statics.{name}" for name in SOLVERS.split()): LOADING,

@@ -13,10 +13,10 @@ from hypothesis import strategies as st
 from scipy.optimize import brentq
 
 import softrobots as sr
-from softrobots.statics import force_path, post_buckling
-from softrobots.statics.critical_load import CriticalPoint, critical_point
-from softrobots.statics.equilibrium_branch import FUNDAMENTAL, RING
-from softrobots.statics.force_path import ForcePath
+from softrobots.statics.buckling import force_path, post_buckling
+from softrobots.statics.buckling.critical_load import CriticalPoint, critical_point
+from softrobots.statics.buckling.equilibrium_branch import FUNDAMENTAL, RING
+from softrobots.statics.buckling.force_path import ForcePath
 from softrobots.view.figures import equilibria
 from tests.support.laws import law
 from tests.support.oracles import arm_balance

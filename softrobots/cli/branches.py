@@ -14,8 +14,8 @@ from softrobots.cli.options.robot_argument import add_model, add_motors, motors_
 from softrobots.cli.reports.answers import add_json, aligned, formatted, print_answer
 from softrobots.core.checks import FloatArray, unit_vector
 from softrobots.core.errors import NoCriticalLoad
-from softrobots.statics.equilibrium_branch import EquilibriumBranch
-from softrobots.statics.post_buckling import post_buckling_branches
+from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
+from softrobots.statics.buckling.post_buckling import post_buckling_branches
 from softrobots.view.figures.equilibria import branches
 
 _EXAMPLES = """examples:

@@ -14,7 +14,7 @@ from softrobots.cli.reports.equilibrium_report import coordinate_lines, equilibr
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import NeutralEquilibrium, NoCriticalLoad
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.critical_load import critical_load
+from softrobots.statics.buckling.critical_load import critical_load
 from softrobots.statics.elastic_state import TOLERANCE
 from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium

@@ -24,8 +24,8 @@ from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.vibration import ModeSwing, VibrationModes
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
+from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
-from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate

@@ -62,6 +62,8 @@ class Load:
     """Wrench by frame name, shape (6,): force [N] then moment [N m], world axes, at the origin of the frame; read-only."""
     gravity: tuple[float, float, float] | None
     """Gravity, world axes [m/s^2]; None: weightless."""
+    environment: Any = None
+    """Obstacles that the robot may touch, a `softrobots.Environment`; None: free space."""
     terms: tuple[LoadTerm, ...] = field(init=False, repr=False)
     """The wrenches with the matrices of their derivatives."""
     conservative: bool = field(init=False, repr=False)
@@ -77,7 +79,7 @@ class Load:
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle with a plain dictionary."""
-        return Load, (dict(self.wrenches), self.gravity)
+        return Load, (dict(self.wrenches), self.gravity, self.environment)
 
     @classmethod
     def of(
@@ -108,9 +110,10 @@ class Load:
         return cls(total, (x, y, z))
 
     def same_as(self, other: Load) -> bool:
-        """Whether another load has the same wrenches and gravity."""
+        """Whether another load has the same wrenches, gravity and obstacles."""
         return self is other or (
             self.gravity == other.gravity
+            and self.environment == other.environment
             and self.wrenches.keys() == other.wrenches.keys()
             and all(np.array_equal(wrench, other.wrenches[name]) for name, wrench in self.wrenches.items())
         )
@@ -118,12 +121,13 @@ class Load:
     def scaled(self, factor: float) -> Load:
         """Return the load with every wrench and gravity multiplied by `factor`."""
         gravity = None if self.gravity is None else tuple(factor * g for g in self.gravity)
-        return Load({name: factor * value for name, value in self.wrenches.items()}, gravity)  # type: ignore[arg-type]
+        wrenches = {name: factor * value for name, value in self.wrenches.items()}
+        return Load(wrenches, gravity, self.environment)  # type: ignore[arg-type]
 
     def with_moments(self, factor: float) -> Load:
         """Return the load with every moment multiplied by `factor`, forces and gravity as they are."""
         share = np.repeat([1.0, factor], 3)
-        return Load({name: share * value for name, value in self.wrenches.items()}, self.gravity)
+        return Load({name: share * value for name, value in self.wrenches.items()}, self.gravity, self.environment)
 
     def turned(self, rotation: FloatArray) -> Load:
         """Return the load turned by a rotation matrix, shape (3, 3), acting at the same frames."""
@@ -132,7 +136,7 @@ class Load:
 
     def plus(self, frame: str, wrench: FloatArray) -> Load:
         """Return the load with one more wrench, shape (6,) [N, N m], at a frame."""
-        return Load({**self.wrenches, frame: self.wrenches.get(frame, 0.0) + wrench}, self.gravity)
+        return Load({**self.wrenches, frame: self.wrenches.get(frame, 0.0) + wrench}, self.gravity, self.environment)
 
 
 def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, FloatArray]:
@@ -159,6 +163,16 @@ def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, Floa
     if model.structure.constant_strain:
         lengths = 0.5 * (lengths + np.append(lengths[1:], 0.0))
     return {row.name: np.concatenate([share * force, np.zeros(3)]) for row, share in zip(rows, lengths.tolist(), strict=True)}
+
+
+def check_no_contact(subject: Any, what: str) -> None:
+    """Check that a load or an equilibrium has no obstacles; `what` cannot take them, in words.
+
+    Raises:
+        ParameterError: If it has.
+    """
+    if subject.environment is not None:
+        raise ParameterError("environment", subject.environment, f"None: {what} takes no obstacles")
 
 
 class AppliedLoad:

@@ -22,11 +22,11 @@ from softrobots.model.dry_friction import FrictionMemory
 from softrobots.model.friction_coordinates import memory_of, remembering
 from softrobots.model.loader import load_again, load_arguments
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.displacement_control import DisplacementControl, Probe
 from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
 from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
-from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed_result
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.load_estimation import METHODS as ESTIMATIONS

@@ -9,8 +9,8 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, positive_number, unit_vector
 from softrobots.core.errors import ParameterError
+from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.equilibrium import Equilibrium
-from softrobots.statics.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.imposed_displacement import ImposedDisplacement
 from softrobots.view.figures.canvas import grid_and_legend, line_style, new_figure, new_plot
 

@@ -9,8 +9,8 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, positive_number
 from softrobots.core.errors import NoCriticalLoad, ParameterError
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.buckling.force_path import ZERO_EIGENVALUE, ForcePath
 from softrobots.statics.elastostatics import balanced_state
-from softrobots.statics.force_path import ZERO_EIGENVALUE, ForcePath
 
 _LARGEST_STEP = 0.1  # of the springs between two points of the path [rad]
 _GROWTH = 0.25  # of the force between two points

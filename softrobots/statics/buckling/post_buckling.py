@@ -30,11 +30,11 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, positive_number
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.critical_load import CriticalPoint, critical_point
+from softrobots.statics.buckling.critical_load import CriticalPoint, critical_point
+from softrobots.statics.buckling.equilibrium_branch import FUNDAMENTAL, RING, EquilibriumBranch
+from softrobots.statics.buckling.force_path import ZERO_EIGENVALUE, FollowedPath, ForcePath, PathPoint
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import equilibrium_from_state
-from softrobots.statics.equilibrium_branch import FUNDAMENTAL, RING, EquilibriumBranch
-from softrobots.statics.force_path import ZERO_EIGENVALUE, FollowedPath, ForcePath, PathPoint
 
 BEYOND = 1.25
 """Default limit of the force on branches, relative to the critical force."""
