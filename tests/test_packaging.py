@@ -93,17 +93,18 @@ ROOMS = {
     "description": "core",
     "robots": "core inflated_beam constant_curvature helix description",
     "model": "core inflated_beam constant_curvature description",
-    "statics": "core inflated_beam model",
-    "dynamics": "core constant_curvature model statics",
-    "identification": "core inflated_beam constant_curvature description robots model statics dynamics",
-    "compiled": "core inflated_beam constant_curvature description model statics dynamics identification",
-    "learning": "core model statics identification compiled",
+    "environment": "core description model",
+    "statics": "core inflated_beam model environment",
+    "dynamics": "core constant_curvature model environment statics",
+    "identification": "core inflated_beam constant_curvature description robots model environment statics dynamics",
+    "compiled": "core inflated_beam constant_curvature description model environment statics dynamics identification",
+    "learning": "core model environment statics identification compiled",
     "jax": "core learning",
     "torch": "core learning",
-    "export": "core inflated_beam constant_curvature description robots model",
-    "view": "core inflated_beam constant_curvature helix description robots model statics dynamics identification",
-    "cli": "core inflated_beam constant_curvature helix description robots model statics dynamics identification compiled"
-    " export view",
+    "export": "core inflated_beam constant_curvature description robots model environment",
+    "view": "core inflated_beam constant_curvature helix description robots model environment statics dynamics identification",
+    "cli": "core inflated_beam constant_curvature helix description robots model environment statics dynamics identification"
+    " compiled export view",
 }
 """Every folder of the package, and the rooms that it may import."""
 TO_CODE = ("trace", "chain", "routes", "drivers", "program", "c", "run", "sweeps")

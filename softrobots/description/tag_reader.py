@@ -21,6 +21,7 @@ from softrobots.description.urdf_tags import (
     NAMESPACE,
     ROLES,
     AnySectionTag,
+    CapsuleTag,
     FrictionTag,
     InflatedLinkTag,
     LineTag,
@@ -62,8 +63,10 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         tip=_tip(root, source),
         friction=tuple(_friction(element, source) for element in _ours(root, "friction")),
         rotors=rotors,
+        capsules=tuple(_capsule(element, source) for element in _ours(root, "capsule")),
     )
     _check_together(tags, source)
+    _check_capsules(tags.capsules, [link.get("name", "") for link in root.findall("link")], source)
     check_structure(root, source)
     muscles = read_actuators(root, _base_to_tip(root, tags), source)
     _unique("muscle", [*(tag.name for tag in muscles), *(tag.name for tag in tags.lines)], source)
@@ -189,6 +192,32 @@ def _friction(element: ElementTree.Element, source: str) -> FrictionTag:
     if tag.bending < 0.0 or tag.guides < 0.0:
         raise DescriptionError(f"{where} has bending {tag.bending} and guides {tag.guides}; required >= 0")
     return tag
+
+
+def _capsule(element: ElementTree.Element, source: str) -> CapsuleTag:
+    link = element.get("link", "")
+    where = f"a capsule of link {link!r} in {source}"
+    start, end = (_point(element, key, where) for key in ("start", "end"))
+    return CapsuleTag(link, start, end, positive(element, "radius", where))
+
+
+def _point(element: ElementTree.Element, key: str, where: str) -> tuple[float, float, float]:
+    values = numbers(element, key, where)
+    if len(values) != 3:
+        raise DescriptionError(f"{where} has {len(values)} numbers as its {key}; x, y and z are required")
+    return values[0], values[1], values[2]
+
+
+def _check_capsules(capsules: Sequence[CapsuleTag], links: Sequence[str], source: str) -> None:
+    known = set(links)
+    for tag, count in Counter(capsules).items():
+        if tag.link not in known:
+            available = ", ".join(links) or "none"
+            raise DescriptionError(
+                f"{source} has a capsule of a link {tag.link!r}; a link that exists is required: {available}"
+            )
+        if count > 1:
+            raise DescriptionError(f"{source} has {count} equal capsules of link {tag.link}; one of them is required")
 
 
 def _tip(root: ElementTree.Element, source: str) -> str | None:

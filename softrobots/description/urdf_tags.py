@@ -185,6 +185,24 @@ class ActuatorTag:
 
 
 @dataclass(frozen=True)
+class CapsuleTag:
+    """A capsule that holds a piece of the body closely, for contact with surroundings: all points near a segment, its core.
+
+    Neighbours share the point between them, so capsules overlap, also across the tiny links of hinges: they are no collision
+    shapes of URDF, whose overlap there would move the equilibrium in simulators.
+    """
+
+    link: str
+    """Name of the link that carries it."""
+    start: tuple[float, float, float]
+    """Start of its core in the frame of the link [m]."""
+    end: tuple[float, float, float]
+    """End of its core there [m]; a sphere has both at one point."""
+    radius: float
+    """Radius of the body, the distance from the core [m]."""
+
+
+@dataclass(frozen=True)
 class FrictionTag:
     """Dry friction of a segment, which does not depend on the rate; `softrobots.model.dry_friction` has its law."""
 
@@ -222,3 +240,5 @@ class RobotTags:
     """Dry friction of segments."""
     rotors: Mapping[str, float] = field(default_factory=dict)
     """Inertia of the rotor of a motor at its joint [kg m^2, or kg at a prismatic joint] by joint name."""
+    capsules: tuple[CapsuleTag, ...] = ()
+    """Capsules along the body, in the order of the file; empty if the file has none."""

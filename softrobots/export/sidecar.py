@@ -15,7 +15,7 @@ from softrobots.core.errors import ParameterError, SoftRobotsError
 from softrobots.description.actuator_reader import NUMBERS
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
-from softrobots.description.urdf_tags import FrictionTag, LumpedSectionTag, SectionTag, SpringTag
+from softrobots.description.urdf_tags import CapsuleTag, FrictionTag, LumpedSectionTag, SectionTag, SpringTag
 from softrobots.export.number_sources import Rules, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model
@@ -68,6 +68,8 @@ _CONVENTIONS = {
     "are given, forces for all other kinds",
     "friction": "dry friction of segments: moment that holds their bending, coefficient of actuators in their guides",
     "lines": "lines along a segment that are drawn and do nothing",
+    "capsules": "hold the body closely, for contact with surroundings: all points at most radius away from the segment from "
+    "start to end, in the frame of link; neighbours overlap",
 }
 
 
@@ -131,6 +133,7 @@ class _Parts:
                 {"name": tag.name, "segment": tag.segment, **self._numbers(tag, "line", azimuth="rad", distance="m")}
                 for tag in tags.lines
             ],
+            "capsules": [self._capsule(tag, number) for number, tag in enumerate(tags.capsules, start=1)],
         }
 
     def _number(self, part: str, name: str, value: Any, unit: str, tag: str) -> dict[str, Any]:
@@ -194,6 +197,11 @@ class _Parts:
         part, kind = f"friction {tag.segment}", "softrobots:friction"
         bending = self._number(part, "bending", tag.bending, "N m", kind)
         return {"segment": tag.segment, "bending": bending, "guides": self._number(part, "guides", tag.guides, "-", kind)}
+
+    def _capsule(self, tag: CapsuleTag, number: int) -> dict[str, Any]:
+        values: dict[str, Any] = {"start": list(tag.start), "end": list(tag.end), "radius": tag.radius}
+        part, kind = f"capsule {number}", "softrobots:capsule"
+        return {"link": tag.link} | {key: self._number(part, key, value, "m", kind) for key, value in values.items()}
 
     def _muscles(self) -> list[dict[str, Any]]:
         arms, entries = self._model.structure.moment_arms, []

@@ -1,0 +1,202 @@
+"""The capsules of robots: they hold the body, follow its numbers and its mounting, and bad ones are refused."""
+
+from __future__ import annotations
+
+import math
+import pickle
+from collections.abc import Callable
+from dataclasses import replace
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+from scipy.integrate import solve_ivp
+
+import softrobots as sr
+from softrobots.core.checks import FloatArray
+from softrobots.description.tag_reader import read_tags
+from softrobots.environment.capsules import robot_capsules
+from softrobots.robots import XacroRobot
+
+ROBOTS: dict[str, Callable[[], XacroRobot]] = {
+    "arm": lambda: sr.InflatableArm(link_lengths=(0.5, 0.7), radius=(0.06, 0.05), wrist=(0.05, 0.2), stiffness=150.0),
+    "two hinges": lambda: sr.InflatableArm(link_model="two_hinges"),
+    "twisting": lambda: sr.InflatableArm(link_model="two_hinges", torsion=True, wrist=(0.0, 0.3)),
+    "sections": lambda: sr.PccArm(radius=(0.05, 0.04)),
+    "lumped": lambda: sr.PccArm(chain="lumped", hinges=5, muscle_azimuths=()),
+    "tendons": lambda: sr.TendonArm(elastic_sections=2),
+    "helix": lambda: sr.HelixTube(length=0.6),
+    "lumped helix": lambda: sr.HelixTube(length=0.6, chain="lumped", hinges=12, handedness="left"),
+    "tube with an actuator": lambda: sr.HelixTube(length=0.6, elastic_sections=4, actuator="length", handedness="left"),
+    "elastic actuator": lambda: sr.HelixTube(length=0.6, elastic_sections=4, actuator="elastic"),
+}
+
+
+def cores(model: sr.SoftModel, q: FloatArray | None = None) -> list[tuple[FloatArray, FloatArray, float]]:
+    """Start and end of the core of every capsule in the world, and its radius."""
+    data = model.pinocchio.createData()
+    pin.forwardKinematics(model.pinocchio, data, pin.neutral(model.pinocchio) if q is None else q)
+    return [(data.oMi[one.joint].act(one.start), data.oMi[one.joint].act(one.end), one.radius) for one in robot_capsules(model)]
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_capsules_join_from_the_base_to_the_tip(name: str, rng: np.random.Generator) -> None:
+    """At rest, and bent where every capsule is a piece of a link; 1e-12: rounding over 60 joints."""
+    robot = ROBOTS[name]()
+    model = sr.load_model(robot)
+    states = [pin.neutral(model.pinocchio)]
+    if not model.structure.section_joints:  # without stretching, which draws neighbours apart
+        bent = rng.uniform(-0.1, 0.1, model.n_springs) * [not name.endswith("stretch") for name in model.spring_joints]
+        states.append(model.configuration(model.relaxed_motors + (0.0 if model.muscles else 0.4), bent))
+    for q in states:
+        chain = cores(model, q)
+        for (_, end, _), (start, _, _) in pairwise(chain):
+            np.testing.assert_allclose(end, start, atol=1e-12)
+        data = model.pinocchio.createData()
+        pin.framesForwardKinematics(model.pinocchio, data, q)
+        tip = data.oMf[model.frame_id(model.tip)].translation
+        np.testing.assert_allclose(chain[-1][1], tip, atol=1e-12)
+
+
+def test_capsules_of_an_arm_have_the_lengths_and_radii_of_its_links() -> None:
+    robot = sr.InflatableArm(link_lengths=(0.5, 0.7), radius=(0.06, 0.05), hinge_offset=(0.04, 0.03), stiffness=150.0)
+    found = [(np.linalg.norm(end - start), radius) for start, end, radius in cores(sr.load_model(robot))]
+    np.testing.assert_allclose(found, [(0.04, 0.06), (0.46, 0.06), (0.03, 0.05), (0.67, 0.05)], rtol=1e-12)
+
+
+@pytest.mark.parametrize("upright", ["tube", "axis"])
+def test_the_straight_halves_of_a_helix_lie_along_its_chords(upright: str) -> None:
+    """The centre line from its strains by a differential equation; 1e-8: its tolerance."""
+    robot = sr.HelixTube(length=0.5, elastic_sections=6, upright=upright)
+    model = sr.load_model(robot)
+    (_, curvature, torsion, _), whole = robot.rest_chain[0], robot.rest_chain[1]
+    w = np.array([[0, -torsion, curvature], [torsion, 0, 0], [-curvature, 0, 0]])  # cross product with (0, curvature, torsion)
+
+    def rate(_: float, state: FloatArray) -> FloatArray:
+        rotation = state[3:].reshape(3, 3)
+        return np.concatenate([rotation[:, 2], (rotation @ w).ravel()])
+
+    data = model.pinocchio.createData()
+    pin.framesForwardKinematics(model.pinocchio, data, pin.neutral(model.pinocchio))
+    base = data.oMf[model.frame_id("base_link")]
+    ends = np.linspace(0.0, whole, 7)
+    start = np.concatenate([base.translation, base.rotation.ravel()])
+    line = solve_ivp(rate, (0.0, whole), start, t_eval=ends, rtol=1e-11, atol=1e-11).y[:3].T
+    halves = cores(model)
+    for section in range(6):
+        (one, middle, _), (again, other, _) = halves[2 * section : 2 * section + 2]
+        np.testing.assert_allclose([one, other], line[section : section + 2], atol=1e-8)
+        np.testing.assert_allclose([middle, again], [line[section : section + 2].mean(axis=0)] * 2, atol=1e-8)
+
+
+def test_a_tube_beside_its_actuator_is_held_along_its_own_straight_axis() -> None:
+    """At rest the tube is straight, its actuator winds around it; 1e-12: rounding."""
+    robot = sr.HelixTube(length=0.6, elastic_sections=5, actuator="length")
+    points = np.array([point for start, end, _ in cores(sr.load_model(robot)) for point in (start, end)])
+    np.testing.assert_allclose(points[:, :2], 0.0, atol=1e-12)
+    np.testing.assert_allclose(points[:, 2], np.repeat(np.linspace(0.0, 0.6, 11), 2)[1:-1], atol=1e-12)
+    assert all(capsule.radius == robot.radius for capsule in robot_capsules(sr.load_model(robot)))
+
+
+def test_mounted_capsules_move_with_their_carrier() -> None:
+    """At the flange of another arm; both robots keep theirs."""
+    carrier, child = sr.InflatableArm(), sr.HelixTube(length=0.4, elastic_sections=3)
+    whole = sr.load_model(sr.mount(carrier, "tip", child, xyz=(0.1, 0.0, 0.0), rpy=(0.0, 0.3, 0.2)))
+    own, mounted = (read_tags(robot.urdf()).capsules for robot in (carrier, child))
+    tags = whole.structure.tags.capsules
+    assert tags == (*own, *(replace(tag, link=f"soft_{tag.link}") for tag in mounted))
+    tip = pin.SE3(np.eye(3), np.array([1.2, 0.0, 0.0])) * pin.SE3(pin.rpy.rpyToMatrix(0.0, 0.3, 0.2), np.array([0.1, 0, 0]))
+    expected = [(tip.act(start), tip.act(end)) for start, end, _ in cores(sr.load_model(child))]
+    found = [(start, end) for start, end, _ in cores(whole)[len(own) :]]
+    np.testing.assert_allclose(found, expected, atol=1e-12)
+
+
+def test_capsules_survive_pickling_other_springs_and_locked_joints() -> None:
+    arm = sr.load_model(sr.InflatableArm())
+    twin, soft = pickle.loads(pickle.dumps(arm)), sr.with_springs(arm, {"spring_1_up": 100.0})
+    locked = sr.load_model(sr.InflatableArm(), motors=["motor_1"])
+    names = ("link_1_root", "link_1", "link_2_root", "link_2")
+    for model in (arm, twin, soft, locked):
+        assert tuple(capsule.link for capsule in robot_capsules(model)) == names
+        np.testing.assert_array_equal([np.hstack(core) for core in cores(model)], [np.hstack(core) for core in cores(arm)])
+    assert robot_capsules(locked)[0].joint == robot_capsules(arm)[0].joint - 1  # motor_2 is fixed
+
+
+def test_other_numbers_make_other_capsules() -> None:
+    base = sr.InflatableArm()
+    long = sr.load_model(replace(base, link_lengths=(0.6, 0.8), radius=(0.055, 0.07), stiffness=172.0))
+    assert robot_capsules(long)[3].end[0] - robot_capsules(sr.load_model(base))[3].end[0] == pytest.approx(0.2, rel=1e-12)
+    assert robot_capsules(long)[3].radius == 0.07
+
+
+PLAIN = """<robot name="plain"><link name="base"/>
+  <link name="bar"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>{0}</link>
+  <joint name="hinge" type="revolute"><parent link="base"/><child link="bar"/><origin xyz="0 0 1"/><axis xyz="0 1 0"/>
+  <limit lower="-1" upper="1" effort="1" velocity="1"/></joint></robot>"""
+CYLINDER = (
+    '<collision><origin xyz="0.1 0 0" rpy="0 {0} 0"/><geometry><cylinder radius="0.2" length="0.6"/></geometry></collision>'
+)
+SPHERE = '<collision><origin xyz="0 0 0.5"/><geometry><sphere radius="0.1"/></geometry></collision>'
+BOX = '<collision><geometry><box size="1 1 1"/></geometry></collision>'
+
+
+def plain(shapes: str) -> sr.SoftModel:
+    """A bar with collision shapes and no tags."""
+    return sr.load_model(PLAIN.format(shapes), springs={"hinge": 5.0})
+
+
+def test_round_collision_shapes_count_without_capsules() -> None:
+    """With the axis of the cylinder turned from z to x."""
+    found = robot_capsules(plain(CYLINDER.format(math.pi / 2) + SPHERE + BOX))
+    assert [(capsule.link, capsule.joint, capsule.radius) for capsule in found] == [("bar", 1, 0.2), ("bar", 1, 0.1)]
+    np.testing.assert_allclose([found[0].start, found[0].end], [(-0.2, 0, 0), (0.4, 0, 0)], atol=1e-15)
+    np.testing.assert_array_equal([found[1].start, found[1].end], [(0, 0, 0.5)] * 2)
+
+
+def test_without_round_shapes_the_others_are_named() -> None:
+    with pytest.raises(sr.DescriptionError, match=r"plain has no capsules.*its collision shapes: a box of link bar"):
+        robot_capsules(plain(BOX))
+    with pytest.raises(sr.DescriptionError, match="its collision shapes: none"):
+        robot_capsules(plain(""))
+    with pytest.raises(sr.ParameterError, match="model"):
+        robot_capsules(sr.InflatableArm())  # type: ignore[arg-type]
+
+
+def tagged(**attributes: str | None) -> str:
+    """The bar with a capsule of which some attributes differ."""
+    good: dict[str, Any] = {"link": "bar", "start": "0 0 0", "end": "0 0 1", "radius": "0.1"}
+    words = " ".join(f'{name}="{value}"' for name, value in (good | attributes).items() if value is not None)
+    return PLAIN.format("").replace("</robot>", f'<s:capsule xmlns:s="urn:softrobots:urdf" {words}/></robot>')
+
+
+@pytest.mark.parametrize(
+    ("attributes", "message"),
+    [
+        ({"link": "arm"}, "a capsule of a link 'arm'; a link that exists is required: base, bar"),
+        ({"link": None}, "a capsule of a link ''"),
+        ({"start": "0 0"}, "2 numbers as its start; x, y and z are required"),
+        ({"start": "0 0 nan"}, "start = '0 0 nan'"),
+        ({"end": "0 0 inf"}, "end = '0 0 inf'"),
+        ({"end": "0 0 1e31"}, "end = '0 0 1e31'"),
+        ({"end": None}, "end = ''"),
+        ({"radius": "0"}, "radius 0.0; a positive number"),
+        ({"radius": "-0.1"}, "radius -0.1; a positive number"),
+        ({"radius": "wide"}, "radius = 'wide'; a finite number"),
+        ({"radius": None}, "radius = None; a finite number"),
+    ],
+)
+def test_bad_capsules_are_refused(attributes: dict[str, str | None], message: str) -> None:
+    with pytest.raises(sr.DescriptionError, match=message):
+        sr.load_model(tagged(**attributes), springs={"hinge": 5.0})
+
+
+def test_equal_capsules_are_refused_and_points_are_spheres() -> None:
+    model = sr.load_model(tagged(end="0 0 0"), springs={"hinge": 5.0})
+    np.testing.assert_array_equal(robot_capsules(model)[0].end, np.zeros(3))
+    twice = tagged().replace(
+        "</robot>", '<s:capsule xmlns:s="urn:softrobots:urdf" link="bar" start="0 0 0.0" end="0 0 1" radius="1e-1"/></robot>'
+    )
+    with pytest.raises(sr.DescriptionError, match="2 equal capsules of link bar"):
+        read_tags(twice)
