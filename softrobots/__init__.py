@@ -45,7 +45,7 @@ from softrobots.identification.informative_poses import InformativePoses, inform
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.sensitivity import Sensitivity, sensitivity
 from softrobots.model.link_limits import LinkLimits
-from softrobots.model.loader import load_model, with_springs
+from softrobots.model.loader import load_model, with_points, with_springs
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import SpringGroup
 from softrobots.robots import ROBOTS, AssumedStiffnessWarning, HelixTube, InflatableArm, PccArm, Route, TendonArm
@@ -163,6 +163,7 @@ __all__ = [
     "vibration_modes",
     "view",
     "waypoints",
+    "with_points",
     "with_springs",
 ]
 

@@ -383,6 +383,18 @@ def test_load_tells_the_parts_of_the_error_and_other_forces(answer, told: Told) 
     assert answer("load", *words, "--no-restart")["alternatives"] == []
 
 
+def test_load_finds_a_push_on_a_point_along_a_direction(answer, told: Told, arm: sr.SoftModel) -> None:
+    """A push on the first link, which the last motor does not feel."""
+    marked, force = sr.with_points(arm, {"touched": ("link_1", (0.4, 0.0, 0.05))}), np.array([0.0, 5.0, -10.0])
+    torques = sr.solve_equilibrium(marked, (0.3, 0.6, -0.8), force, frame="touched").motor_torques
+    words = (*BENT, "--torques", *map(repr, torques.tolist()), "--frame", "link_1", "--point", "0.4", "0", "0.05")
+    found = answer("load", *words, "--direction", "0", "1", "-2")
+    assert np.allclose(found["force"], force, rtol=0.0, atol=1e-8)
+    assert (found["frame"], len(found["singular_values"])) == ("point_of_link_1", 1)
+    assert re.search(r"^force on point_of_link_1 +\S+  5  -10 N$", told("load", *words, "--direction", "0", "1", "-2")[1], re.M)
+    assert "NOT FELT along" in told("load", *words)[1]
+
+
 def test_load_names_the_direction_that_is_not_felt(answer, told: Told) -> None:
     """A straight arm does not feel a pull along itself."""
     words = ("inflatable_arm", "--motors", "0", "0", "0", "--torques", "0", "0", "0")

@@ -20,6 +20,9 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.export.sidecar import to_json
+from softrobots.statics.elastic_state import elastic_state
+from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.loads import Load
 from softrobots.view.meshcat_page.page_commands import RESOLUTION
 from tests.support.law_robots import ROBOTS, Case, cases, model, triples
 from tests.support.laws import law
@@ -133,6 +136,32 @@ def test_a_model_that_was_sent_elsewhere_gives_the_same_bytes(kind: str, case: C
         options = {"motors": robot.structure.motor_joints, "tip": robot.tip, "muscles": robot.muscle_input}
         if kind not in ("limp", "slack"):  # the springs of a link with a law of its own must be equal
             assert sr.load_model(robot.urdf, springs=table, **options) != robot
+
+
+@law("with_points")
+@pytest.mark.parametrize("kind", ["arm", "two_hinges", "pcc", "helix_lumped", "mounted", "foreign"])
+@given(case=cases(), point=st.lists(st.floats(-0.3, 0.3), min_size=3, max_size=3), share=st.floats(0.3, 0.9))
+@settings(max_examples=2)
+def test_a_force_at_a_point_is_a_force_and_its_moment_at_the_link(kind: str, case: Case, point: list, share: float) -> None:
+    """Where a force at a point of a link is in equilibrium, so is the force at the link with the moment of its lever."""
+    robot, force = model(kind), 0.3 * case.force(kind)
+    links = [frame.name for frame in robot.pinocchio.frames if frame.type == pin.FrameType.BODY]
+    link = links[int(share * len(links))]
+    other = sr.with_points(robot, {"touched here": (link, point)})
+    assert (other.spring_table, other.motor_joints, other.tip, other.n_springs) == (
+        robot.spring_table,
+        robot.motor_joints,
+        robot.tip,
+        robot.n_springs,
+    )
+    found = sr.solve_equilibrium(other, case.motors(other), force, frame="touched here", gravity=case.gravity)
+    pose = frame_placement(robot, found.q, link)
+    assert np.allclose(frame_placement(other, found.q, "touched here").translation, pose.act(np.array(point)), atol=1e-14)
+    wrench = np.concatenate([force, np.cross(pose.rotation @ point, force)])
+    load = Load.of(robot, wrench=wrench, frame=link, gravity=case.gravity)
+    state = elastic_state(robot, found.q_motors, found.q_springs, load)
+    assert state.error <= found.residual + 1e-13 * state.scale  # rounding of the lever
+    assert np.allclose(state.load.motors, found.motor_torques, rtol=0.0, atol=1e-13 * max(state.scale, 1.0))
 
 
 @law("with_springs")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from functools import cache
+from typing import Any
 
 import numpy as np
 import pytest
@@ -72,6 +73,28 @@ def test_force_at_another_frame(arm: sr.SoftModel) -> None:
     assert len(estimate.unobservable_directions) == 1
     assert np.allclose(estimate.equilibrium.motor_torques, truth.motor_torques, atol=1e-8)
     assert abs(along @ estimate.force) < 0.05 * np.linalg.norm(force)
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_a_push_on_a_known_point_along_known_directions_comes_back(count: int, rng: np.random.Generator, tmp_path: Any) -> None:
+    """On the first link only two motors feel a force; along one or two directions it is known all the same, to 1e-8 of it."""
+    robot = sr.with_points(sr.load_model(sr.InflatableArm()), {"touched": ("link_1", (0.3, 0.0, 0.055))})
+    for _ in range(4):
+        motors, directions, sizes = rng.uniform(-1, 1, 3), rng.normal(size=(count, 3)), rng.uniform(5, 20, count)
+        force = sizes @ (directions / np.linalg.norm(directions, axis=1, keepdims=True))
+        pushed = sr.solve_equilibrium(robot, motors, force, frame="touched", gravity=sr.EARTH_GRAVITY, tolerance=1e-13)
+        options = {"frame": "touched", "gravity": sr.EARTH_GRAVITY, "torque_std": 0.1}
+        found = sr.estimate_load(robot, motors, pushed.motor_torques, directions=directions, **options)
+        assert np.abs(found.force - force).max() <= 1e-8 * np.linalg.norm(force)
+        assert found.singular_values.shape == (count,)
+        assert found.covariance is not None
+        assert np.linalg.matrix_rank(found.covariance, 1e-12 * np.linalg.norm(found.covariance)) == count
+        any_direction = sr.estimate_load(robot, motors, pushed.motor_torques, **options)
+        assert len(any_direction.unobservable_directions) == 1
+    again = sr.load_result(sr.save_result(found, tmp_path / "pushed.npz"))
+    assert np.array_equal(again.force, found.force)
+    assert np.allclose(again.covariance, found.covariance, rtol=1e-12)
+    assert np.allclose(again.directions.T @ again.directions, found.directions.T @ found.directions, atol=1e-15)
 
 
 def test_straight_elbow_hides_the_axial_force(arm: sr.SoftModel) -> None:
@@ -183,6 +206,11 @@ def test_torques_that_no_force_gives_are_an_error_with_the_best(arm: sr.SoftMode
         ({"gravity": (0, 0)}, "gravity"),
         ({"max_iterations": -3}, "max_iterations"),
         ({"restart": "no"}, "restart"),
+        ({"directions": (0, 0, 0)}, "directions"),
+        ({"directions": (0, 1)}, "directions"),
+        ({"directions": ((0, 0, 1), (0, 0, 2))}, "independent directions"),
+        ({"directions": ((0, 0, 1), (0, 0, float("nan")))}, "directions"),
+        ({"directions": (0, 0, 1), "method": "alternation"}, "None for 'alternation'"),
     ],
 )
 def test_bad_input_is_refused(arm: sr.SoftModel, options: dict, message: str) -> None:

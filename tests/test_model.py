@@ -140,6 +140,23 @@ def test_with_springs_refuses_what_loading_refuses() -> None:
         sr.with_springs(sr.load_model(sr.InflatableArm(max_moment=12.0)), {"spring_1_up": 99.0})
 
 
+@each_row(
+    ("points", "error", "message"),
+    [
+        ([("here", ("link_1", (0, 0, 0)))], sr.ParameterError, "mapping"),
+        ({"link_1": ("link_2", (0, 0, 0))}, sr.ParameterError, "names that no frame or joint"),
+        ({"": ("link_2", (0, 0, 0))}, sr.ParameterError, "names that no frame or joint"),
+        ({"here": "link_2"}, sr.ParameterError, r"a link and a point of it, \(link"),
+        ({"here": ("link_9", (0, 0, 0))}, sr.NameNotFound, "no link is called 'link_9'.*available: .*link_1"),
+        ({"here": ("link_1", (0, 0))}, sr.ParameterError, r"points\['here'\].*shape \(3,\)"),
+        ({"here": ("link_1", (0, 0, float("nan")))}, sr.ParameterError, r"points\['here'\].*finite"),
+    ],
+)
+def test_points_that_a_model_cannot_have_are_refused(points: Any, error: type, message: str, arm: sr.SoftModel) -> None:
+    with pytest.raises(error, match=message):
+        sr.with_points(arm, points)
+
+
 def test_results_cannot_be_changed(arm: sr.SoftModel) -> None:
     for array in (arm.stiffness, arm.rest, arm.motor_limits, arm.spring_limits):
         with pytest.raises(ValueError, match="read-only"):

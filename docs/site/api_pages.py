@@ -60,7 +60,7 @@ PAGES = {
                 f"softrobots.robots.fields.{name}"
                 for name in ("parameter", "per_part", "per_actuator", "check_parameters", "Facts")
             ),
-            *_top("load_model", "with_springs", "SoftModel", "SpringGroup", "grown_coordinates"),
+            *_top("load_model", "with_springs", "with_points", "SoftModel", "SpringGroup", "grown_coordinates"),
             *(f"softrobots.robots.parameter_file.{name}" for name in ("read_robot", "read_parameters", "write_parameters")),
             *_top("mount", "description.composition.fix_joints", "description.third_party.robot_file", "__version__"),
         ),

@@ -21,6 +21,7 @@ from softrobots.cli.options.robot_argument import (
 from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, attributes, formatted, print_answer
 from softrobots.cli.reports.equilibrium_report import equilibrium_answer, equilibrium_lines, joined_units
 from softrobots.model.actuators import load_units
+from softrobots.model.loader import with_points
 from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feels, estimate_load
 
 _EXAMPLES = """examples:
@@ -28,6 +29,7 @@ _EXAMPLES = """examples:
   softrobots load inflatable_arm --motors 0.3 0.6 -0.8 --torques 10.193 -16.605 -7.675 --torque-std 0.05 --json
   softrobots load inflatable_arm --motors 0.3 0.6 -0.8 --torques 10.2 -16.6 -7.7 --stiffness-std 0.0325 --motor-angle-std 0.009
   softrobots load inflatable_arm --motors 0 0 0 --torques 11.9 -17.8 -8.8 --torque-std 0.1    a straight elbow feels less
+  softrobots load inflatable_arm --motors 0.3 0.6 -0.8 --torques 2.13 -5.02 0 --frame link_1 --point 0.4 0 0 --direction 0 1 -2
 """
 
 
@@ -57,6 +59,9 @@ def add_parser(subparsers: Any) -> None:
         help="search once, from zero force: ten times as fast, but without other forces that explain the torques",
     )
     parser.add_argument("--frame", metavar="LINK", help="where the force acts (the tip)")
+    add_numbers(parser, "--point", "X Y Z", "point where it acts, in the axes of the link of --frame [m] (its origin)")
+    help_text = "direction that the force has, as at a contact without friction, world axes, of any length [-] (any)"
+    add_numbers(parser, "--direction", "X Y Z", help_text)
     add_gravity(parser)
     parser.add_argument(
         "--method", choices=METHODS, default="newton", help="the solver; alternation is the paper's (%(default)s)"
@@ -71,8 +76,12 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Estimate and print the answer."""
     check_output(arguments, ".npz")
-    model = statics_model_of(arguments)
+    model, frame = statics_model_of(arguments), arguments.frame
     check_feels(model)
+    if arguments.point is not None:
+        link = model.tip if frame is None else frame
+        frame = f"point_of_{link}"
+        model = with_points(model, {frame: (link, arguments.point)})
     motors = motors_of(model, arguments.motors)
     units = load_units(model.actuators.units)
     check_one_each("--torques", arguments.torques, model.motor_joints, units)
@@ -88,7 +97,8 @@ def run(arguments: argparse.Namespace) -> None:
         motors,
         arguments.torques,
         method=arguments.method,
-        frame=arguments.frame,
+        frame=frame,
+        directions=arguments.direction,
         gravity=gravity_of(arguments),
         restart=not arguments.no_restart,
         **deviations,

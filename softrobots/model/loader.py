@@ -6,6 +6,7 @@ import copyreg
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import is_dataclass, replace
 from functools import partial
+from html import escape
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.constant_curvature.strain_chain import joint_positions
-from softrobots.core.checks import FloatArray, choice, finite_number, positive_number
+from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, positive_number
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.description.sources import Robot, read_source
 from softrobots.description.tag_reader import read_tags
@@ -141,6 +142,42 @@ def with_springs(model: SoftModel, springs: Mapping[str, float | tuple[float, fl
     structure = check_model(model).structure
     present = {name: SpringTag(*pair) for name, pair in model.spring_table.items()}
     return reassemble(model, _given_springs(springs, structure.spring_joints, present, removable=False))
+
+
+def with_points(model: SoftModel, points: Mapping[str, tuple[str, Any]]) -> SoftModel:
+    """Return a robot with further frames at points of its links: where forces act, or where the robot is touched.
+
+    Each is a link without mass in the URDF text of the model, fixed to its link with the same axes: `frame=` of a load, of
+    `estimate_load`, of files and other tools knows it by its name. The statics stays as it is.
+
+    Args:
+        model: The robot; it stays as it is.
+        points: By the name of the frame, a link (or another frame of the file) and the point in its axes, shape (3,) [m].
+
+    Returns:
+        The model, loaded from that text; friction has no memory there, and `robot` is None.
+
+    Raises:
+        NameNotFound: If a link does not exist.
+        ParameterError: If `model` is not a `SoftModel`, a name is taken or no text, or a point is not three finite numbers.
+    """
+    links = [frame.name for frame in check_model(model).pinocchio.frames if frame.type == pin.FrameType.BODY]
+    if not isinstance(points, Mapping):
+        raise ParameterError("points", points, "a mapping {name: (link, point)}")
+    added = []
+    for name, place in points.items():
+        if not isinstance(name, str) or not name.isprintable() or not name or model.pinocchio.existFrame(name):
+            raise ParameterError("points", name, "names that no frame or joint of the robot has")
+        if not isinstance(place, tuple) or len(place) != 2:
+            raise ParameterError(f"points[{name!r}]", place, "a link and a point of it, (link, (x, y, z))")
+        if place[0] not in links:
+            raise NameNotFound("link", str(place[0]), links)
+        at = " ".join(map(repr, finite_array(f"points[{name!r}]", place[1], (3,), "m").tolist()))
+        link, parent, joint = (f'"{escape(word)}"' for word in (name, place[0], f"{name}_joint"))
+        added.append(f'  <link name={link}/>\n  <joint name={joint} type="fixed">\n    <parent link={parent}/>\n')
+        added.append(f'    <child link={link}/>\n    <origin xyz="{at}"/>\n  </joint>\n')
+    before, end, after = model.urdf.rpartition("</robot>")
+    return load_again("".join([before, *added, end, after]), **load_arguments(model))
 
 
 def _given_springs(

@@ -23,6 +23,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
 from softrobots.statics.loads import Load
+from softrobots.statics.tip_force.force_search import ANY
 from softrobots.statics.tip_force.load_errors import MeasurementErrors
 from softrobots.statics.tip_force.measured_torques import SOLVERS, Explanation, MeasuredTorques
 
@@ -51,7 +52,8 @@ class LoadEstimate:
     method: str
     """The solver."""
     singular_values: FloatArray
-    """Singular values of the derivative of the motor torques with respect to the force, descending, shape (3,) [m]."""
+    """Singular values of the derivative of the motor torques with respect to the force, descending, shape (3,) [m]; (k,) for
+    a force along k given directions."""
     unobservable_directions: FloatArray
     """Unit directions whose singular value is below `OBSERVABLE` times the reach, shape (k, 3); k may be 0."""
     covariance: FloatArray | None
@@ -64,6 +66,8 @@ class LoadEstimate:
     than three motors are fitted."""
     iterations: int
     """Steps of the solver."""
+    directions: FloatArray | None = None
+    """Orthonormal directions that the force may have, shape (k, 3); None: any."""
     alternatives: tuple[LoadEstimate, ...] = ()
     """Other forces that were found to explain the torques as well, smallest first."""
 
@@ -86,6 +90,7 @@ def estimate_load(
     *,
     method: str = "newton",
     frame: str | None = None,
+    directions: Any = None,
     gravity: Any = None,
     torque_std: Any = None,
     stiffness_std: Any = None,
@@ -114,7 +119,10 @@ def estimate_load(
         motor_torques: Load on each motor, shape (n_motors,) [N m or N], with the sign of `Equilibrium.motor_torques`:
             minus what the motor exerts; of a muscle its tension.
         method: "newton" or "alternation".
-        frame: Frame at which the force acts; the tip by default.
+        frame: Frame at which the force acts; the tip by default. `softrobots.with_points` makes frames at points of links,
+            where something touches the robot.
+        directions: Directions that the force may have, shape (3,) or (k, 3), world axes, any length: the normal of a contact
+            without friction. None: any. Not for "alternation".
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         torque_std: Standard deviation of the torque noise, one number or shape (n_motors,) [N m], for the covariance; five
             times it may then stay unexplained.
@@ -143,10 +151,13 @@ def estimate_load(
     torques = finite_array("motor_torques", motor_torques, (model.n_motors,), "N m")
     errors = MeasurementErrors.of(model, torque_std, stiffness_std, motor_angle_std)
     at = model.tip if frame is None else frame
+    span = _span(directions)
+    if method == "alternation" and directions is not None:
+        raise ParameterError("directions", directions, "None for 'alternation', which finds forces of any direction")
     base = Load.of(model, frame=at, gravity=gravity)
     most = 100 if method == "newton" else 1000
     most = most if max_iterations is None else positive_integer("max_iterations", max_iterations)
-    problem = MeasuredTorques(model, motors, torques, base, at, errors)
+    problem = MeasuredTorques(model, motors, torques, base, at, errors, span)
     best, *others = SOLVERS[method](problem, most, restart=restart)
     result = _estimate(problem, best, method, others)
     if not (problem.explained(best) and result.equilibrium.converged):
@@ -173,10 +184,27 @@ def check_feels(model: SoftModel) -> None:
         raise ParameterError("model", model, requirement)
 
 
+def _span(directions: Any) -> FloatArray:
+    """Orthonormal directions of the given ones, shape (k, 3); `ANY` for None.
+
+    Raises:
+        ParameterError: If they are not one to three finite rows that are independent.
+    """
+    if directions is None:
+        return ANY
+    rows = np.atleast_2d(finite_array("directions", directions, None, "-"))
+    if rows.ndim == 2 and rows.shape[1] == 3 and 0 < len(rows) <= 3:
+        rows = rows / np.maximum(np.linalg.norm(rows, axis=1, keepdims=True), 1e-300)
+        _, sizes, span = np.linalg.svd(rows, full_matrices=False)
+        if sizes[-1] > 1e-9:
+            return read_only(span)
+    raise ParameterError("directions", directions, "one to three independent directions, shape (3,) or (k, 3)")
+
+
 def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others: list[Explanation]) -> LoadEstimate:
     force, state, iterations, (left, values, right, keep), errors = found
     observable = right[: len(values)][keep]
-    singular_values = np.zeros(3)
+    singular_values = np.zeros(len(right))
     singular_values[: len(values)] = values
     inverse = observable.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
     load = problem.load(force)
@@ -194,6 +222,7 @@ def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others:
         covariance_parts=MappingProxyType(parts),
         residual=problem.residual(state),
         iterations=iterations,
+        directions=None if problem.span is ANY else problem.span,
         alternatives=tuple(_estimate(problem, other, method, []) for other in others),
         **problem.errors._asdict(),
     )
@@ -201,7 +230,7 @@ def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others:
 
 def packed_estimate(estimate: LoadEstimate) -> dict[str, Any]:
     """Return the named arrays of an estimate for a result file, without its equilibrium."""
-    names = ("force", "frame", "measured_torques", *MeasurementErrors._fields)
+    names = ("force", "frame", "directions", "measured_torques", *MeasurementErrors._fields)
     others = [(other.force, other.equilibrium.q_springs) for other in estimate.alternatives]
     forces, springs = zip(*others, strict=True) if others else (None, None)
     fields = {name: getattr(estimate, name) for name in names}
@@ -227,7 +256,8 @@ def estimate_at(equilibrium: Equilibrium, fields: Mapping[str, Any]) -> LoadEsti
     other_springs = finite_array("other_springs", given_springs, (len(others), model.n_springs), "rad")
     base = equilibrium.load.plus(frame, np.concatenate([-force, np.zeros(3)]))
     errors = MeasurementErrors.of(model, *(fields.get(name) for name in MeasurementErrors._fields))
-    problem = MeasuredTorques(model, motors, torques, base, frame, errors)
+    span = _span(fields.get("directions"))
+    problem = MeasuredTorques(model, motors, torques, base, frame, errors, span)
     best, *rest = (
         problem.explanation(one, elastic_state(model, motors, springs, problem.load(one)), equilibrium.iterations)
         for one, springs in ((force, equilibrium.q_springs), *zip(others, other_springs, strict=True))

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, read_only
 from softrobots.statics.elastic_state import MOMENT_FLOOR, TOLERANCE
 
 OBSERVABLE = 1e-3
@@ -23,23 +23,27 @@ State = TypeVar("State")
 """A robot in equilibrium, as the solver represents it."""
 
 
+ANY = read_only(np.eye(3))
+"""The directions of a force that may have any."""
+
+
 class Directions(NamedTuple):
-    """Singular value decomposition of the torque slope `d tau_m / d f`, shape (n_motors, 3)."""
+    """Singular value decomposition of the torque slope `d tau_m / d f`, shape (n_motors, k), over k directions of the force."""
 
     left: FloatArray
     """Directions of the motor torques, in columns, shape (n_motors, n_motors)."""
     values: FloatArray
-    """Singular values, descending, shape (at most 3,) [m]."""
+    """Singular values, descending, shape (at most k,) [m]."""
     right: FloatArray
-    """Directions of the force, in rows, shape (3, 3)."""
+    """Directions of the force, in rows, shape (k, 3)."""
     observable: Any
     """Which directions are observable by their singular value, truth values."""
 
     @classmethod
-    def of(cls, slope: FloatArray, reach: float) -> Directions:
-        """Decompose the torque slope of a robot with a given reach [m]."""
-        left, values, right = np.linalg.svd(slope)
-        return cls(left, values, right, values > OBSERVABLE * reach)
+    def of(cls, slope: FloatArray, reach: float, span: FloatArray = ANY) -> Directions:
+        """Decompose the torque slope of a robot, shape (n_motors, 3), with a given reach [m] over orthonormal directions."""
+        left, values, right = np.linalg.svd(slope @ span.T)
+        return cls(left, values, right @ span, values > OBSERVABLE * reach)
 
 
 class Measurement(Protocol[State]):

@@ -62,6 +62,8 @@ class MeasuredTorques:
     """Where the force acts."""
     errors: MeasurementErrors
     """Errors of measurement."""
+    span: FloatArray
+    """Orthonormal directions that the force may have, shape (k, 3)."""
 
     @cached_property
     def tolerance(self) -> float:
@@ -91,7 +93,7 @@ class MeasuredTorques:
         if self.model.structure.actuator_laws is not None:  # a tension by law is not conjugate to its input
             felt = state.point.motor_derivatives(AppliedLoad(self.model, self.base).at(state.q))[1].T
         moved, _ = tip_motion(self.model, motors, springs, state.tangent, felt)
-        return Directions.of(moved.T, self.model.reach)
+        return Directions.of(moved.T, self.model.reach, self.span)
 
     def explanation(self, force: FloatArray, state: ElasticState, iterations: int) -> Explanation:
         """Return a force with the robot under it and what tells how well it explains the torques.
@@ -119,7 +121,7 @@ class MeasuredTorques:
 
     def fitted(self, found: Explanation) -> bool:
         """Whether a force leaves no more than rounding or errors of measurement, by directions that the motors all feel."""
-        felt = len(found.directions.values) == 3 and bool(found.directions.observable.all())
+        felt = len(found.directions.values) == len(self.span) and bool(found.directions.observable.all())
         return felt and self.residual(found.state) <= max(self.tolerance, found.scatter)
 
     @property
@@ -153,14 +155,14 @@ def newton(problem: MeasuredTorques, most: int, *, restart: bool) -> list[Explan
     size, others = problem.elastic_force, list[Explanation]()
     felt = best.directions.observable.all()
     if not problem.explained(best) or (felt and problem.residual(best.state) > problem.tolerance):
-        for direction in sphere(_STARTS):
+        for direction in sphere(_STARTS) @ problem.span.T @ problem.span:
             again = _search_from(problem, 2.0 * size * direction, start, most)
             if again is not None and problem.residual(again.state) < problem.residual(best.state):
                 best = again
                 if problem.fitted(best):
                     break
     if problem.fitted(best):
-        along = best.directions.right[2]
+        along = best.directions.right[-1]
         for step in _STEPS:
             other = _search_from(problem, best.force + step * size * along, best.state, most)
             if other is not None and problem.fitted(other) and not any(_same(other, one) for one in (best, *others)):
