@@ -53,6 +53,7 @@ from softrobots.robots.growth import grown_coordinates
 from softrobots.statics.buckling.critical_load import critical_load
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.buckling.post_buckling import post_buckling_branches
+from softrobots.statics.contact.grasp import contact_wrench, is_force_closure, pull_out_force
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
@@ -126,6 +127,7 @@ __all__ = [
     "__version__",
     "compliance",
     "constant_curvature",
+    "contact_wrench",
     "critical_load",
     "cross_validate",
     "damping_time_from_decrement",
@@ -140,12 +142,14 @@ __all__ = [
     "inflated_beam",
     "informative_poses",
     "input_shaper",
+    "is_force_closure",
     "linearize",
     "load_model",
     "load_result",
     "measured_decay",
     "mount",
     "post_buckling_branches",
+    "pull_out_force",
     "quintic",
     "read_waypoints",
     "residual_vibration",

@@ -73,6 +73,8 @@ PAGES = {
             *_top("compliance", "elastostatic_jacobian", "critical_load", "estimate_load", "LoadEstimate"),
             *_top("post_buckling_branches", "EquilibriumBranch"),
             *_top("solve_imposed_displacement", "ImposedDisplacement"),
+            *_top("contact_wrench", "is_force_closure", "pull_out_force"),
+            *(f"softrobots.statics.contact.grasp.{name}" for name in ("ForceClosure", "PullOut")),
         ),
     ),
     "kinematics": ApiPage(
