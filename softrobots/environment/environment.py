@@ -1,0 +1,181 @@
+"""The obstacles around a robot."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray, finite_number, instance_of
+from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
+
+KINDS: dict[str, type[Obstacle]] = {kind.kind: kind for kind in (HalfSpace, Sphere, Box, Cylinder, Capsule)}
+"""Obstacles by their kind in plain data."""
+
+_POSE_STEP = 1e-5
+"""Relative step of the central difference of a pose: truncation and rounding are both about 1e-10."""
+
+
+@dataclass(frozen=True, eq=False)
+class Environment:
+    """The obstacles that a robot may touch, and whether it may touch itself.
+
+    Immutable; equal, with the same hash, if the obstacles are equal, in the same order. It pickles if the poses of its obstacles
+    do.
+    """
+
+    obstacles: Any = ()
+    """The obstacles: a tuple, of any iterable."""
+    self_contact: bool = False
+    """Whether parts of the robot that are not neighbours keep apart; see `softrobots.environment.self_contact`."""
+
+    def __post_init__(self) -> None:
+        """Check the obstacles, and name those without a name."""
+        if isinstance(self.obstacles, str | bytes | Mapping) or not isinstance(self.obstacles, Iterable):
+            raise ParameterError("obstacles", self.obstacles, "a list of obstacles, such as [HalfSpace((0, 0, 1))]")
+        given = tuple(self.obstacles)
+        for place, one in enumerate(given):
+            instance_of(f"obstacles[{place}]", one, Obstacle, f"an obstacle ({', '.join(k.__name__ for k in KINDS.values())})")
+        instance_of("self_contact", self.self_contact, bool, "True or False")
+        taken, named = {one.name for one in given}, []
+        for one in given:
+            if one.name is None:
+                number = next(i for i in range(1, len(given) + 2) if f"{one.kind}_{i}" not in taken)
+                one = replace(one, name=f"{one.kind}_{number}")
+                taken.add(one.name)
+            named.append(one)
+        object.__setattr__(self, "obstacles", tuple(named))
+        doubled = [name for name in self.names if self.names.count(name) > 1]
+        if doubled:
+            raise ParameterError("obstacles", self.names, f"of different names ({doubled[0]!r} comes more than once)")
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of the obstacles, in order."""
+        return tuple(one.name for one in self.obstacles)
+
+    def __getitem__(self, name: str) -> Obstacle:
+        """Return the obstacle of a name.
+
+        Raises:
+            NameNotFound: If there is none; the error lists the names.
+        """
+        for one in self.obstacles:
+            if one.name == name:
+                return one  # type: ignore[no-any-return]
+        raise NameNotFound("obstacle", name, self.names)
+
+    def __iter__(self) -> Iterator[Obstacle]:
+        """Go through the obstacles."""
+        return iter(self.obstacles)
+
+    def __len__(self) -> int:
+        """Number of obstacles."""
+        return len(self.obstacles)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether the other has the same obstacles."""
+        return self is other or (isinstance(other, Environment) and self._identity == other._identity)
+
+    def __hash__(self) -> int:
+        """Hash that fits `==`."""
+        return hash(self._identity)
+
+    @cached_property
+    def _identity(self) -> tuple[Any, ...]:
+        return self.obstacles, self.self_contact
+
+    @property
+    def moves(self) -> bool:
+        """Whether the pose of an obstacle is a function of a parameter."""
+        return any(one.moves for one in self.obstacles)
+
+    def at(self, parameter: float) -> Environment:
+        """Return the environment with every obstacle fixed where it is at a value of the parameter of the poses.
+
+        Raises:
+            ParameterError: If the parameter is no finite number, or a pose no rigid transform.
+        """
+        number = finite_number("parameter", parameter)
+        return replace(self, obstacles=tuple(one.at(number) for one in self.obstacles)) if self.moves else self
+
+    def moved(self, name: str, transform: Any) -> Environment:
+        """Return the environment with one obstacle moved by a rigid transform of the world.
+
+        Args:
+            name: Name of the obstacle, which must be fixed.
+            transform: A `pinocchio.SE3`, or shape (4, 4), applied on top of where the obstacle is.
+
+        Raises:
+            NameNotFound: If there is no such obstacle.
+            ParameterError: If it is no rigid transform, or if the obstacle is moved by a function.
+        """
+        chosen = self[name]
+        after = chosen.moved(transform)
+        return replace(self, obstacles=tuple(after if one is chosen else one for one in self.obstacles))
+
+    def rates(self, parameter: float) -> FloatArray:
+        """Velocity of each obstacle per change of the parameter, shape (n, 6): of its point at the world's origin, then angular.
+
+        Central differences of the poses, whose step is 1e-5 of the parameter, and at least 1e-5; zero for fixed obstacles.
+
+        Raises:
+            ParameterError: If the parameter is no finite number, or a pose no rigid transform.
+        """
+        number = finite_number("parameter", parameter)
+        step = _POSE_STEP * max(abs(number), 1.0)
+        rows = np.zeros((len(self), 6))
+        for row, one in zip(rows, self.obstacles, strict=True):
+            if one.moves:
+                before, here, after = (one.at(value).pose for value in (number - step, number, number + step))
+                slope = (after - before) / (2.0 * step)
+                spin = slope[:3, :3] @ here[:3, :3].T
+                row[3:] = 0.5 * np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]])
+                row[:3] = slope[:3, 3] - np.cross(row[3:], here[:3, 3])
+        return rows
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return it as plain data, for JSON or YAML.
+
+        Raises:
+            ParameterError: If an obstacle moves: `at` fixes it.
+        """
+        return {"obstacles": [one.to_dict() for one in self.obstacles], "self_contact": self.self_contact}
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any]) -> Environment:
+        """Return the environment that `to_dict` returned.
+
+        Raises:
+            ParameterError: If the data has another form, or a value is invalid.
+            NameNotFound: If there is no such kind of obstacle.
+        """
+        form = "as Environment.to_dict returns it: {'obstacles': [{'kind': 'box', 'size': ...}, ...], 'self_contact': ...}"
+        if not isinstance(data, Mapping) or not {"obstacles"} <= data.keys() <= {"obstacles", "self_contact"}:
+            raise ParameterError("data", data, form)
+        if not isinstance(data["obstacles"], list | tuple) or not all(isinstance(one, Mapping) for one in data["obstacles"]):
+            raise ParameterError("data['obstacles']", data["obstacles"], form)
+        obstacles = []
+        for one in data["obstacles"]:
+            kind = one.get("kind")
+            if kind not in KINDS:
+                raise NameNotFound("kind of obstacle", kind, KINDS)
+            known = {name.name for name in fields(KINDS[kind]) if name.init}
+            values = {name: value for name, value in one.items() if name != "kind"}
+            for name in values:
+                if name not in known:
+                    raise NameNotFound(f"field of a {kind}", name, sorted(known))
+            try:
+                obstacles.append(KINDS[kind](**values))
+            except TypeError as error:  # a field is missing
+                raise ParameterError("data['obstacles']", one, f"complete ({error})") from error
+        return cls(obstacles, self_contact=data.get("self_contact", False))
+
+
+def check_environment(environment: Any) -> Environment:
+    """Return `environment` if it is an `Environment`, or raise ParameterError."""
+    return instance_of("environment", environment, Environment, "an Environment, such as Environment([HalfSpace((0, 0, 1))])")

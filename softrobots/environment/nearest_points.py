@@ -1,0 +1,89 @@
+"""Where the core of a capsule comes nearest to a convex body, and where it crosses between features of the body."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.environment.distance_fields import Field
+
+_MAX_ITERATIONS = 60
+_SLOPE = 1e-13
+"""Slope of the distance along the core at which the minimum is found; the distance is then exact to rounding."""
+_PARALLEL = 1e-12
+"""Curvature along the core, times distance, below which the nearest point is not unique: ends and borders hold the gap then."""
+_ROUND = 0.1
+"""The same, above which a minimum stands for a border of its feature that is nearer than half the distance."""
+
+
+class CorePoints(NamedTuple):
+    """Candidates of contact inside of cores."""
+
+    pairs: Any
+    """The pair of each, shape (m,), integers."""
+    features: Any
+    """0 for the minimum, 1 + place of the border in `Field.borders` for a crossing, shape (m,), integers."""
+    points: FloatArray
+    """Points of the cores, shape (m, 3) [m]."""
+    distances: FloatArray
+    """Their distances from the bodies, shape (m,) [m]."""
+    normals: FloatArray
+    """Normals, shape (m, 3)."""
+
+
+def core_points(field: Field, which: Any, starts: FloatArray, spans: FloatArray, limits: FloatArray, merged: float) -> CorePoints:
+    r"""Minima of the distance inside of straight cores, and crossings of borders between features.
+
+    The distance is convex along a core, so its slope :math:`n \cdot t` grows: the minimum lies between the neighbouring ones of
+    ends and borders where it changes sign, and Newton steps within that interval find it.
+
+    Args:
+        field: Distances from the bodies.
+        which: Body of each pair, shape (m,).
+        starts: Starts of the cores, shape (m, 3) [m].
+        spans: From start to end of the cores, shape (m, 3) [m].
+        limits: Distance of interest of each pair, shape (m,) [m].
+        merged: Distance from an end of the core within which a candidate is that end [m].
+
+    Returns:
+        The candidates.
+    """
+    count = len(which)
+    length = np.sqrt((spans * spans).sum(axis=1))
+    borders = field.borders(starts, spans, which)
+    order = np.argsort(np.where((borders > 0.0) & (borders < 1.0), borders, 2.0), axis=1)
+    shares = np.take_along_axis(borders, order, axis=1)
+    shares = np.where((shares > 0.0) & (shares < 1.0), shares, 1.0)
+    shares = np.concatenate([np.zeros((count, 1)), shares, np.ones((count, 1))], axis=1)
+    points = starts[:, None] + shares[:, :, None] * spans[:, None]
+    flat, normal = field.at(points.reshape(-1, 3), np.repeat(which, shares.shape[1]))
+    distances, normals = flat.reshape(shares.shape), normal.reshape(points.shape)
+    slopes = (normals * spans[:, None]).sum(axis=2) / length[:, None]
+
+    place = np.clip((slopes < 0.0).sum(axis=1) - 1, 0, shares.shape[1] - 2)
+    rows = np.flatnonzero((slopes[:, 0] < 0.0) & (slopes[:, -1] > 0.0))
+    lower, upper = shares[rows, place[rows]], shares[rows, place[rows] + 1]
+    share, minimum, across, bend = _minimum(
+        field, which[rows], starts[rows], spans[rows], length[rows], lower, upper, slopes[rows, place[rows]], slopes[rows, place[rows] + 1]
+    )
+    keep = (shares[:, 1:-1] * length[:, None] > merged) & ((1.0 - shares[:, 1:-1]) * length[:, None] > merged)
+    keep &= distances[:, 1:-1] <= limits[:, None]
+    standing = np.maximum(minimum, 0.0)
+    for shift in (-1, 0):  # the borders before and after the minimum
+        border = np.clip(place[rows] + shift, 0, keep.shape[1] - 1)
+        apart = np.abs(shares[rows, border + 1] - share) * length[rows]
+        represented = (apart <= merged) | ((apart <= 0.5 * standing) & (bend * standing > _ROUND))
+        keep[rows[represented], border[represented]] = False
+    found = (bend * standing > _PARALLEL) | (minimum <= 0.0)
+    found &= (share * length[rows] > merged) & ((1.0 - share) * length[rows] > merged) & (minimum <= limits[rows])
+
+    pairs, columns = np.nonzero(keep)
+    return CorePoints(
+        np.concatenate([rows[found], pairs]),
+        np.concatenate([np.zeros(int(found.sum()), dtype=np.intp), 1 + order[pairs, columns]]),
+        np.concatenate([starts[rows[found]] + share[found, None] * spans[rows[found]], points[pairs, columns + 1]]),
+        np.concatenate([minimum[found], distances[pairs, columns + 1]]),
+        np.concatenate([across[found], normals[pairs, columns + 1]]),
+    )
