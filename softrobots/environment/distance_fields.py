@@ -23,6 +23,10 @@ _TINY = 1e-300
 class Field(Protocol):
     """Signed distances from several bodies; `which` gives the body of each point, shape (m,)."""
 
+    @property
+    def radii(self) -> FloatArray:
+        """Distance of the surface from the features within, shape (n,) [m]."""
+
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of each point, shape (m, 3), from each body, shape (m, n) [m]."""
 
@@ -48,6 +52,11 @@ class HalfSpaces(NamedTuple):
     """Out of the wall, shape (n, 3)."""
     offsets: FloatArray
     """Distances of the planes from the origin, shape (n,) [m]."""
+
+    @property
+    def radii(self) -> FloatArray:
+        """Zero: planes."""
+        return np.zeros(len(self.offsets))
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of each point from each plane."""
@@ -194,5 +203,6 @@ class Cylinders(NamedTuple):
         root = np.sqrt(np.where((root > 0.0) & (square > _TINY), root, np.inf))
         square = np.where(square > _TINY, square, 1.0)
         return np.stack(
-            [(half - local[:, 2]) / rise, (-half - local[:, 2]) / rise, (-turn - root) / square, (-turn + root) / square], axis=1
+            [(half - local[:, 2]) / rise, (-half - local[:, 2]) / rise, (-turn - root) / square, (-turn + root) / square],
+            axis=1,
         )

@@ -24,8 +24,7 @@ _POSE_STEP = 1e-5
 class Environment:
     """The obstacles that a robot may touch, and whether it may touch itself.
 
-    Immutable; equal, with the same hash, if the obstacles are equal, in the same order. It pickles if the poses of its obstacles
-    do.
+    Immutable; equal, with the same hash, if the obstacles are equal, in the same order. It pickles if the poses do.
     """
 
     obstacles: Any = ()
@@ -119,7 +118,7 @@ class Environment:
         return replace(self, obstacles=tuple(after if one is chosen else one for one in self.obstacles))
 
     def rates(self, parameter: float) -> FloatArray:
-        """Velocity of each obstacle per change of the parameter, shape (n, 6): of its point at the world's origin, then angular.
+        """Velocity of each obstacle per parameter, shape (n, 6): of its point at the origin of the world, then angular.
 
         Central differences of the poses, whose step is 1e-5 of the parameter, and at least 1e-5; zero for fixed obstacles.
 

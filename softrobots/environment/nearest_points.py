@@ -33,7 +33,9 @@ class CorePoints(NamedTuple):
     """Normals, shape (m, 3)."""
 
 
-def core_points(field: Field, which: Any, starts: FloatArray, spans: FloatArray, limits: FloatArray, merged: float) -> CorePoints:
+def core_points(
+    field: Field, which: Any, starts: FloatArray, spans: FloatArray, limits: FloatArray, merged: float
+) -> CorePoints:
     r"""Minima of the distance inside of straight cores, and crossings of borders between features.
 
     The distance is convex along a core, so its slope :math:`n \cdot t` grows: the minimum lies between the neighbouring ones of
@@ -58,21 +60,21 @@ def core_points(field: Field, which: Any, starts: FloatArray, spans: FloatArray,
     shares = np.where((shares > 0.0) & (shares < 1.0), shares, 1.0)
     shares = np.concatenate([np.zeros((count, 1)), shares, np.ones((count, 1))], axis=1)
     points = starts[:, None] + shares[:, :, None] * spans[:, None]
-    flat, normal = field.at(points.reshape(-1, 3), np.repeat(which, shares.shape[1]))
-    distances, normals = flat.reshape(shares.shape), normal.reshape(points.shape)
+    flat = field.at(points.reshape(-1, 3), np.repeat(which, shares.shape[1]))
+    distances, normals = flat[0].reshape(shares.shape), flat[1].reshape(points.shape)
     slopes = (normals * spans[:, None]).sum(axis=2) / length[:, None]
 
-    place = np.clip((slopes < 0.0).sum(axis=1) - 1, 0, shares.shape[1] - 2)
     rows = np.flatnonzero((slopes[:, 0] < 0.0) & (slopes[:, -1] > 0.0))
-    lower, upper = shares[rows, place[rows]], shares[rows, place[rows] + 1]
-    share, minimum, across, bend = _minimum(
-        field, which[rows], starts[rows], spans[rows], length[rows], lower, upper, slopes[rows, place[rows]], slopes[rows, place[rows] + 1]
-    )
+    place = (slopes[rows] < 0.0).sum(axis=1) - 1
+    ends = np.stack([place, place + 1], axis=1)
+    bracket, across_ends = shares[rows[:, None], ends], slopes[rows[:, None], ends]
+    reach = across_ends * (distances[rows[:, None], ends] + field.radii[which[rows], None])
+    share, minimum, normal, bend = _minimum(field, which[rows], starts[rows], spans[rows], bracket, across_ends, reach)
     keep = (shares[:, 1:-1] * length[:, None] > merged) & ((1.0 - shares[:, 1:-1]) * length[:, None] > merged)
     keep &= distances[:, 1:-1] <= limits[:, None]
     standing = np.maximum(minimum, 0.0)
     for shift in (-1, 0):  # the borders before and after the minimum
-        border = np.clip(place[rows] + shift, 0, keep.shape[1] - 1)
+        border = np.clip(place + shift, 0, keep.shape[1] - 1)
         apart = np.abs(shares[rows, border + 1] - share) * length[rows]
         represented = (apart <= merged) | ((apart <= 0.5 * standing) & (bend * standing > _ROUND))
         keep[rows[represented], border[represented]] = False
@@ -85,5 +87,46 @@ def core_points(field: Field, which: Any, starts: FloatArray, spans: FloatArray,
         np.concatenate([np.zeros(int(found.sum()), dtype=np.intp), 1 + order[pairs, columns]]),
         np.concatenate([starts[rows[found]] + share[found, None] * spans[rows[found]], points[pairs, columns + 1]]),
         np.concatenate([minimum[found], distances[pairs, columns + 1]]),
-        np.concatenate([across[found], normals[pairs, columns + 1]]),
+        np.concatenate([normal[found], normals[pairs, columns + 1]]),
     )
+
+
+def _minimum(
+    field: Field, which: Any, starts: FloatArray, spans: FloatArray, bracket: FloatArray, slopes: FloatArray, reach: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Find the minimum along each core by Newton steps within a bracket of its share, by bisection where they leave it.
+
+    Args:
+        field: Distances from the bodies.
+        which: Body of each core, shape (m,).
+        starts: Starts of the cores, shape (m, 3) [m].
+        spans: From start to end of the cores, shape (m, 3) [m].
+        bracket: Shares of the core between which the slope changes sign, shape (m, 2).
+        slopes: Slopes there, shape (m, 2).
+        reach: Slopes times distances from the features there: where the feature is a point or line, linear between, (m, 2).
+
+    Returns:
+        Share, distance [m], normal and curvature of the distance along the core [1/m] at the minimum.
+    """
+    length = np.sqrt((spans * spans).sum(axis=1))
+    along = spans / length[:, None]
+    lower, upper = bracket.T.copy()
+    guess = reach if np.all(reach[:, 1] > reach[:, 0]) else slopes
+    share = lower - (upper - lower) * guess[:, 0] / (guess[:, 1] - guess[:, 0])
+    best = share, np.zeros(len(which)), np.zeros_like(starts), np.zeros(len(which))
+    for _ in range(_MAX_ITERATIONS if len(which) else 0):
+        points = starts + share[:, None] * spans
+        distance, normal = field.at(points, which)
+        slope = (normal * along).sum(axis=1)
+        directions, curvatures = field.curvature(points, which)
+        bend = (curvatures * (directions @ along[:, :, None])[:, :, 0] ** 2).sum(axis=1)
+        best = share, distance, normal, bend
+        lower, upper = np.where(slope < 0.0, share, lower), np.where(slope > 0.0, share, upper)
+        open_rows = (np.abs(slope) > _SLOPE) & (upper - lower > 1e-15)
+        if not open_rows.any():
+            break
+        step = np.where(bend > 0.0, -slope / (np.where(bend > 0.0, bend, 1.0) * length), np.inf)
+        trial = share + step
+        trial = np.where((trial > lower) & (trial < upper), trial, 0.5 * (lower + upper))
+        share = np.where(open_rows, trial, share)
+    return best

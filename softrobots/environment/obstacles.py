@@ -101,7 +101,7 @@ class Obstacle:
             ParameterError: If it moves: `at` fixes it.
         """
         self._check_fixed()
-        return self.own_transform if self.pose is None else np.asarray(self.pose @ self.own_transform)
+        return self.own_transform if self.pose is None else np.asarray(np.asarray(self.pose) @ self.own_transform)
 
     def at(self: Kind, parameter: float) -> Kind:
         """Return the obstacle fixed in the pose that it has at a value of the parameter.
@@ -121,7 +121,7 @@ class Obstacle:
         """
         self._check_fixed()
         moved = rigid_transform("transform", transform)
-        return replace(self, pose=moved if self.pose is None else moved @ self.pose)
+        return replace(self, pose=moved if self.pose is None else moved @ np.asarray(self.pose))
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data: its kind and fields, arrays as lists.

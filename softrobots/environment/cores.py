@@ -1,0 +1,90 @@
+"""The cores of a robot's capsules, and where they are in a configuration."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray
+from softrobots.environment.capsules import RobotCapsule
+from softrobots.model.soft_model import SoftModel
+
+SAME_POINT = 1e-9
+"""Distance, relative to the reach, within which points are one."""
+
+
+class CorePlaces(NamedTuple):
+    """Cores in a configuration, world axes."""
+
+    ends: FloatArray
+    """Start and end of each core, shape (n, 2, 3) [m]."""
+    spans: FloatArray
+    """From start to end, shape (n, 3) [m]."""
+    jacobian: FloatArray
+    """Velocity of the point of a body at the world's origin, then angular, per joint rate, shape (6, nv)."""
+    placements: FloatArray
+    """Transforms of the joints that carry capsules to the world, shape (k, 4, 4)."""
+
+
+class Cores:
+    """The capsules of a robot that its joints move; belongs to the thread that created it."""
+
+    def __init__(self, model: SoftModel, capsules: tuple[RobotCapsule, ...]) -> None:
+        """Take the capsules; those that never move are left out, because no equilibrium changes what they touch."""
+        self.capsules = tuple(one for one in capsules if one.joint > 0)
+        self.count = len(self.capsules)
+        self.radii = np.array([one.radius for one in self.capsules])
+        self.joints = np.array([one.joint for one in self.capsules], dtype=np.intp)
+        self.lengths = np.array([float(np.linalg.norm(one.end - one.start)) for one in self.capsules])
+        self._model, self._data = model.workspace(None)
+        self._numbers, self.carrier = np.unique(self.joints, return_inverse=True)
+        self._numbers = self._numbers.tolist()
+        ends = np.array([[one.start, one.end] for one in self.capsules]).reshape(-1, 2, 3)
+        self._local = np.concatenate([ends, np.ones((self.count, 2, 1))], axis=2)
+        self.moves = self._motion()
+        """1 where a joint coordinate moves a capsule, else 0, shape (n, nv)."""
+        self.single_ends = self._single_ends(model)
+        """Number of capsule and end (0 or 1) of each different end, shape (k, 2): neighbours share ends at a joint."""
+        self.end_numbers = self._end_numbers
+        """Row of `single_ends` of each end, shape (n, 2)."""
+
+    def at(self, q: FloatArray) -> CorePlaces:
+        """Return the cores at Pinocchio's configuration, shape (nq,)."""
+        pin.computeJointJacobians(self._model, self._data, q)
+        placements = self._data.oMi
+        transforms = np.array([placements[number].homogeneous for number in self._numbers]).reshape(-1, 4, 4)
+        ends = (self._local @ np.swapaxes(transforms[self.carrier, :3], 1, 2)).reshape(-1, 2, 3)
+        jacobian = np.array(self._data.J).reshape(6, self._model.nv)
+        return CorePlaces(ends, ends[:, 1] - ends[:, 0], jacobian, transforms)
+
+    def _motion(self) -> FloatArray:
+        joints = self._model.joints
+        moves = np.zeros((self.count, self._model.nv))
+        for row, joint in zip(moves, self.joints.tolist(), strict=True):
+            for number in list(self._model.supports[joint])[1:]:
+                row[joints[number].idx_v : joints[number].idx_v + joints[number].nv] = 1.0
+        return moves
+
+    def _single_ends(self, model: SoftModel) -> Any:
+        """Ends of equal radius that are one material point: at one place, and of one velocity, in two configurations."""
+        random = np.random.default_rng(0)
+        same: Any = True
+        for _ in range(2):
+            q = pin.integrate(self._model, pin.neutral(self._model), random.uniform(-0.5, 0.5, self._model.nv))
+            places = self.at(q)
+            points = places.ends.reshape(-1, 3)
+            moves = np.repeat(self.moves, 2, axis=0)
+            apart = np.linalg.norm(points[:, None] - points, axis=2)
+            same = same & (apart <= SAME_POINT * model.reach)
+            for i, j in np.argwhere(np.triu(same, 1)).tolist():
+                change = places.jacobian * (moves[i] - moves[j])
+                speed = change[:3] + np.cross(change[3:], points[i], axisa=0, axisc=0)
+                same[i, j] = same[j, i] = bool(np.abs(speed).max(initial=0.0) <= SAME_POINT * max(model.reach, 1.0))
+        radii = np.repeat(self.radii, 2)
+        same = same & (radii[:, None] == radii)
+        first = same.argmax(axis=1) if self.count else np.zeros(0, dtype=np.intp)
+        kept, numbers = np.unique(first, return_inverse=True)
+        self._end_numbers = numbers.reshape(-1, 2)
+        return np.stack([kept // 2, kept % 2], axis=1)

@@ -1,0 +1,260 @@
+r"""Gaps between a robot and its surroundings, with first and second derivatives by the joints.
+
+A capsule of the robot is a core, the segment :math:`x(s) = p + s\,t`, and a radius `r`. A candidate of contact is a material
+point of the core with gap :math:`g = \phi(x) - r`, where `phi` is the signed distance from the obstacle; with velocity `u` of
+that point and :math:`n = \nabla \phi`, `H` the Hessian of `phi`,
+
+.. math:: \delta g = n^T u, \qquad
+    \delta^2 g = n^T \delta^2 x + u^T H u - \frac{(u^T H t + n^T \delta t)^2}{t^T H t}
+
+the last term where the point is the nearest of the core and moves along it (the envelope theorem); not at ends and borders.
+Each pair has several candidates: ends, the minimum between them, and points where the core crosses borders between features of
+the obstacle (edges, rims), which hold a core that lies flat, where the nearest point is not unique. `theory.md`, "Contact".
+"""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
+from softrobots.environment.capsules import robot_capsules
+from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores
+from softrobots.environment.distance_fields import Field, HalfSpaces, cross
+from softrobots.environment.environment import Environment, check_environment
+from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
+from softrobots.model.joint_loads import JointLoad
+from softrobots.model.soft_model import SoftModel
+
+
+class MaterialPoints(NamedTuple):
+    """Points of the two surfaces at candidates, each in the axes of what it moves with; friction follows them."""
+
+    capsules: Any
+    """Capsule of each, shape (m,), integers."""
+    obstacles: Any
+    """Obstacle of each, shape (m,), integers."""
+    on_robot: FloatArray
+    """Point of the robot in the axes of its joint, shape (m, 3) [m]."""
+    on_obstacle: FloatArray
+    """Point of the obstacle in its own axes, shape (m, 3) [m]."""
+
+
+class Gaps:
+    """Candidates of contact at one configuration; rows are candidates, in no order of size."""
+
+    def __init__(self, cores: Cores, places: CorePlaces, found: Candidates, transforms: FloatArray, reach: float) -> None:
+        """Take the candidates, the transforms of the obstacles to the world, shape (n, 4, 4), and the reach [m]."""
+        self.capsules, self.obstacles, self.features = found.capsules, found.obstacles, found.features
+        """Capsule, obstacle and feature of each candidate, shape (m,), integers. Numbers of obstacles beyond the last are
+        capsules of the robot itself: the number less that of obstacles."""
+        self.core_points, self.normals = found.points, found.normals
+        """Material points of the cores, and normals from obstacle to robot, shape (m, 3)."""
+        self.radii: FloatArray = cores.radii[found.capsules]
+        """Radii of the capsules, shape (m,) [m]."""
+        self.values: FloatArray = found.distances - self.radii
+        """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
+        self._cores, self._places, self._parts, self._transforms, self._reach = cores, places, found.parts, transforms, reach
+
+    def __len__(self) -> int:
+        """Number of candidates."""
+        return len(self.values)
+
+    @property
+    def points(self) -> FloatArray:
+        """Nearest points on the robot's surface, shape (m, 3) [m]."""
+        return np.asarray(self.core_points - self.radii[:, None] * self.normals)
+
+    @property
+    def obstacle_points(self) -> FloatArray:
+        """Nearest points on the obstacles, shape (m, 3) [m]."""
+        return np.asarray(self.core_points - (self.values + self.radii)[:, None] * self.normals)
+
+    @cached_property
+    def keys(self) -> tuple[tuple[int, int, int], ...]:
+        """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next."""
+        return tuple(zip(self.capsules.tolist(), self.obstacles.tolist(), self.features.tolist(), strict=True))
+
+    @cached_property
+    def moves(self) -> FloatArray:
+        """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv)."""
+        return np.asarray(self._cores.moves[self.capsules])
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
+        """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
+        return self._rows(slice(None), self.normals, self.core_points, 0.0)
+
+    def _rows(self, rows: Any, directions: FloatArray, points: FloatArray, couples: Any) -> FloatArray:
+        """Work of forces, shape (k, 3), at points of the cores, and of couples, per joint rate, shape (k, nv)."""
+        wrenches = np.concatenate([directions, cross(points, directions) + couples], axis=1)
+        return np.asarray((wrenches @ self._places.jacobian) * self.moves[rows])
+
+    def point_jacobian(self, rows: Any, points: FloatArray) -> FloatArray:
+        """Velocity of material points of the robot per joint rate.
+
+        Args:
+            rows: Candidates whose capsules carry the points, shape (k,), integers.
+            points: The points, world axes, shape (k, 3) [m]: `core_points`, or `points` of the surface.
+
+        Returns:
+            Shape (k, 3, nv).
+        """
+        jacobian, moves = self._places.jacobian, self.moves[rows][:, None, :]
+        turned = cross(jacobian[3:].T, points[:, None, :])  # (k, nv, 3)
+        return np.asarray((jacobian[:3] + np.swapaxes(turned, 1, 2)) * moves)
+
+    def load(self, forces: FloatArray) -> JointLoad:
+        """Return forces on the robot as dead forces at their material points.
+
+        Args:
+            forces: Normal forces at the points of the cores, shape (m,) [N]; or forces of any direction, world axes, at the
+                points of the surface, shape (m, 3) [N].
+
+        Returns:
+            The load on the joints; its potential is `-sum f . x`.
+        """
+        normal = forces.ndim == 1
+        rows = np.flatnonzero(forces if normal else forces.any(axis=1))
+        vectors = forces[rows, None] * self.normals[rows] if normal else forces[rows]
+        points = self.core_points[rows]
+        if not normal:
+            points = points - self.radii[rows, None] * self.normals[rows]
+        linear = self.point_jacobian(rows, points)
+        angular = self._places.jacobian[3:] * self.moves[rows][:, None, :]
+        by_force = -cross(vectors[:, None, :], np.swapaxes(linear, 1, 2))
+        nv = linear.shape[2]
+        return JointLoad(
+            torque=np.asarray((vectors[:, None, :] @ linear)[:, 0].sum(axis=0)),
+            angular=angular.reshape(-1, nv),
+            by_force=np.ascontiguousarray(np.swapaxes(by_force, 1, 2)).reshape(-1, nv),
+            by_moment=None,
+            gravity_derivative=None,
+            potential=-float((vectors * points).sum()),
+            scale=self._reach * float(np.sqrt((vectors * vectors).sum(axis=1)).sum()),
+        )
+
+    def curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
+        r"""What the second derivatives of the gaps have beside those of dead forces.
+
+        Args:
+            forces: Normal forces, shape (m,) [N].
+
+        Returns:
+            Rows, shape (k, nv), and weights, shape (k,) [N/m]: :math:`\sum f_i\, d^2 g_i` is the derivative of the torque of
+            `load(forces)` plus `rows.T @ diag(weights) @ rows`.
+        """
+        nv = self._places.jacobian.shape[1]
+        found, weights, first = [np.zeros((0, nv))], [np.zeros(0)], 0
+        for field, which in self._parts:
+            rows = first + np.flatnonzero(forces[first : first + len(which)])
+            if len(rows) and not isinstance(field, HalfSpaces):
+                self._curved(field, which[rows - first], rows, forces[rows], found, weights)
+            first += len(which)
+        return np.concatenate(found), np.concatenate(weights)
+
+    def _curved(self, field: Field, which: Any, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
+        """Append the terms of the candidates of one field."""
+        points, normals = self.core_points[rows], self.normals[rows]
+        directions, curvatures = field.curvature(points, which)
+        for place in (0, 1):
+            bent = np.flatnonzero(curvatures[:, place])
+            found.append(self._rows(rows[bent], directions[bent, place], points[bent], 0.0))
+            weights.append(forces[bent] * curvatures[bent, place])
+        spans = self._places.spans[self.capsules[rows]]
+        parts = curvatures * (directions @ spans[:, :, None])[:, :, 0]
+        pulls = (parts[:, :, None] * directions).sum(axis=1)  # H t
+        bend = (pulls * spans).sum(axis=1)
+        slides = np.flatnonzero((self.features[rows] == INSIDE) & (bend > 0.0))
+        couples = cross(spans, normals)[slides]
+        found.append(self._rows(rows[slides], pulls[slides], points[slides], couples))
+        weights.append(-forces[slides] / bend[slides])
+
+    def drift(self, rates: FloatArray) -> FloatArray:
+        """Velocity of the gaps while obstacles move and the robot stands, shape (m,).
+
+        Args:
+            rates: Velocities of the obstacles, shape (n, 6); see `Environment.rates`.
+
+        Returns:
+            Derivatives of the gaps by the parameter of the poses.
+        """
+        mine = self.obstacles < len(rates)
+        moving = (
+            np.where(mine[:, None], rates[np.where(mine, self.obstacles, 0)], 0.0) if len(rates) else np.zeros((len(self), 6))
+        )
+        speeds = moving[:, :3] + cross(moving[:, 3:], self.obstacle_points)
+        return -np.asarray((speeds * self.normals).sum(axis=1))
+
+    def material(self, rows: Any) -> MaterialPoints:
+        """Return the nearest points of the two surfaces at some candidates as points of their materials.
+
+        Args:
+            rows: Candidates, shape (k,), integers.
+
+        Returns:
+            The points; `Surroundings.world_points` says where they are in another configuration.
+        """
+        capsules, obstacles = self.capsules[rows], self.obstacles[rows]
+        joints = self._places.placements[self._cores.carrier[capsules]]
+        on_robot = ((self.points[rows] - joints[:, :3, 3])[:, None, :] @ joints[:, :3, :3])[:, 0]
+        others = self._frames(obstacles)
+        on_obstacle = ((self.obstacle_points[rows] - others[:, :3, 3])[:, None, :] @ others[:, :3, :3])[:, 0]
+        return MaterialPoints(capsules, obstacles, on_robot, on_obstacle)
+
+    def places_of(self, points: MaterialPoints) -> tuple[FloatArray, FloatArray]:
+        """Where material points of robot and obstacles are in this configuration, world axes.
+
+        Args:
+            points: What `material` returned, here or in another configuration, also with obstacles elsewhere.
+
+        Returns:
+            Points of the robot and of the obstacles, shapes (k, 3) [m]. What the one moved relative to the other since then is
+            the slip.
+        """
+        joints, others = self._places.placements[self._cores.carrier[points.capsules]], self._frames(points.obstacles)
+        on_robot = (joints[:, :3, :3] @ points.on_robot[:, :, None])[:, :, 0] + joints[:, :3, 3]
+        return on_robot, (others[:, :3, :3] @ points.on_obstacle[:, :, None])[:, :, 0] + others[:, :3, 3]
+
+    def _frames(self, obstacles: Any) -> FloatArray:
+        """Transforms of obstacles to the world; of capsules of the robot, their joints'."""
+        joints = self._places.placements[self._cores.carrier]
+        return np.asarray(np.concatenate([self._transforms, joints])[obstacles])
+
+
+class Surroundings:
+    """A robot among obstacles; belongs to the thread that created it."""
+
+    def __init__(self, model: SoftModel, environment: Environment) -> None:
+        """Take a robot and fixed obstacles.
+
+        Raises:
+            ParameterError: If an obstacle moves (`Environment.at` fixes it), or an argument is of another kind.
+            DescriptionError: If the robot has no capsules, and no collision shapes that are spheres or cylinders.
+        """
+        check_environment(environment)
+        self._cores = Cores(model, robot_capsules(model))
+        self._fields, self._transforms = obstacle_fields(environment), obstacle_transforms(environment)
+        self._reach = model.reach
+        links = tuple(one.link for one in self._cores.capsules)
+        self.links = links
+        """Link of each capsule of the robot."""
+        self.names = (*environment.names, *links)
+        """Name of each obstacle, and then the link of each capsule, which the robot itself may touch."""
+
+    def at(self, q: FloatArray, margin: float) -> Gaps:
+        """Return the candidates of contact.
+
+        Args:
+            q: Pinocchio's configuration, shape (nq,).
+            margin: Largest gap of a candidate [m].
+
+        Returns:
+            The candidates with their derivatives.
+        """
+        places = self._cores.at(q)
+        found = find_candidates(self._cores, places, self._fields, margin, SAME_POINT * self._reach)
+        return Gaps(self._cores, places, found, self._transforms, self._reach)
