@@ -38,6 +38,7 @@ from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.ring_down import RingDown, ring_down
 from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
+from softrobots.environment.capsule_error import capsule_error
 from softrobots.identification.cross_validation import CrossValidation, cross_validate
 from softrobots.identification.identification import Identification
 from softrobots.identification.identify import identify
@@ -125,6 +126,7 @@ __all__ = [
     "ViewerError",
     "Workspace",
     "__version__",
+    "capsule_error",
     "compliance",
     "constant_curvature",
     "contact_wrench",

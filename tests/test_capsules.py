@@ -12,6 +12,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import example, given, settings
+from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
 import softrobots as sr
@@ -19,6 +21,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.description.tag_reader import read_tags
 from softrobots.environment.capsules import robot_capsules
 from softrobots.robots import XacroRobot
+from tests.support.laws import law
 
 ROBOTS: dict[str, Callable[[], XacroRobot]] = {
     "arm": lambda: sr.InflatableArm(link_lengths=(0.5, 0.7), radius=(0.06, 0.05), wrist=(0.05, 0.2), stiffness=150.0),
@@ -200,3 +203,106 @@ def test_equal_capsules_are_refused_and_points_are_spheres() -> None:
     )
     with pytest.raises(sr.DescriptionError, match="2 equal capsules of link bar"):
         read_tags(twice)
+
+
+# --- How far the body is from its capsules
+
+
+def distance(points: FloatArray, start: FloatArray, end: FloatArray) -> FloatArray:
+    """Distance of points, shape (n, 3), from a segment, shape (n,)."""
+    along = end - start
+    share = np.clip((points - start) @ along / max(along @ along, 1e-30), 0.0, 1.0)
+    return np.linalg.norm(points - start - share[:, None] * along, axis=1)
+
+
+def largest_error(line: FloatArray, segments: list[tuple[FloatArray, FloatArray]], radius: float) -> float:
+    """Largest distance of balls around a sampled line from capsules around segments, and the other way, by brute force."""
+    axis, turn = np.meshgrid(np.linspace(-1.0, 1.0, 41), np.linspace(0.0, 2.0 * np.pi, 72, endpoint=False))
+    across = np.sqrt(1.0 - axis**2)
+    directions = np.stack([across * np.cos(turn), across * np.sin(turn), axis], axis=-1).reshape(-1, 3)
+    surface = (line[:, None] + radius * directions).reshape(-1, 3)
+    outside = np.min([distance(surface, *segment) for segment in segments], axis=0).max() - radius
+    core = np.concatenate([start + np.linspace(0.0, 1.0, 50)[:, None] * (end - start) for start, end in segments])
+    pieces = np.min([distance(core, *piece) for piece in pairwise(line)], axis=0).max()
+    return max(float(outside), float(pieces))
+
+
+def section_errors(model: sr.SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> list[float]:
+    """The errors of sections of constant strain: screws of Pinocchio against the capsules where the joints put them."""
+    data = model.pinocchio.createData()
+    pin.framesForwardKinematics(model.pinocchio, data, model.configuration(q_motors, q_springs))
+    capsules, z = robot_capsules(model), model.structure.section_coordinates(q_motors, q_springs)
+    shares, errors = np.linspace(0.0, 1.0, 61), []
+    for row, section in enumerate(model.structure.section_table):
+        first = model.pinocchio.getJointId(section.joint_names[0])
+        before = data.oMi[model.pinocchio.parents[first]] * model.pinocchio.jointPlacements[first]
+        start = before * pin.SE3(pin.rpy.rpyToMatrix(-section.rest_joints[0], 0.0, 0.0), np.zeros(3))
+        motion = np.array([0.0, 0.0, section.length + z[row, 3], *z[row, :3]])
+        line = np.array([(start * pin.exp6(share * motion)).act(np.array([*section.middle, 0.0])) for share in shares])
+        own = [one for one in capsules if one.link in (f"{section.name}_lower", f"{section.name}_upper")]
+        segments = [(data.oMi[one.joint].act(one.start), data.oMi[one.joint].act(one.end)) for one in own]
+        errors.append(largest_error(line, segments, own[0].radius))
+    return errors
+
+
+sides = st.floats(-1.2, 1.2)
+
+
+@law("capsule_error")
+@given(bends=st.tuples(sides, sides), twist=st.floats(-1.5, 1.5), stretch=st.floats(-0.04, 0.1))
+@settings(max_examples=6)
+@example(bends=(0.0, 0.0), twist=0.0, stretch=0.08)
+@example(bends=(0.0, 0.0), twist=0.0, stretch=-0.12)  # each half passes the other end
+def test_the_error_around_a_chain_is_the_largest_distance(bends: tuple[float, float], twist: float, stretch: float) -> None:
+    """Attained: the largest sampled distance is never above, and below by what the samples miss, directions up to 4 degrees."""
+    robot = sr.PccArm(segment_lengths=(0.2,), elastic_sections=1, muscle_azimuths=(), radius=0.03)
+    model = sr.load_model(robot)
+    q_springs = np.array([*bends, twist, stretch])
+    (bound,), (found,) = sr.capsule_error(model, [], q_springs), section_errors(model, np.zeros(0), q_springs)
+    assert bound - 5e-3 * (bound + robot.radius[0]) <= found <= bound + 1e-12
+
+
+@pytest.mark.parametrize("actuator", ["drawn", "length", "elastic"])
+def test_the_error_of_a_helix_bounds_the_distance(actuator: str, rng: np.random.Generator) -> None:
+    """Around the chain, attained; beside it, the bound is at most twice the distance here."""
+    robot = sr.HelixTube(length=0.3, elastic_sections=3, actuator=actuator)
+    model = sr.load_model(robot)
+    motors = model.relaxed_motors
+    for size in (0.0, 0.3):
+        y = model.rest + size * rng.uniform(-1.0, 1.0, model.n_springs) * np.where(model.springs.turning, 1.0, 0.02)
+        bounds, found = sr.capsule_error(model, motors, y), np.array(section_errors(model, motors, y))
+        assert np.all(found <= bounds + 1e-12)
+        if actuator == "drawn":
+            assert np.all(found >= bounds - 2.5e-3 * (bounds + robot.radius))
+        elif size:
+            assert np.all(found >= 0.5 * bounds)
+
+
+@given(bends=st.tuples(sides, sides), stretch=st.floats(-0.05, 0.1))
+@settings(max_examples=6)
+def test_the_error_of_a_hinge_is_that_of_the_arc_between_its_pieces(bends: tuple[float, float], stretch: float) -> None:
+    """The arc that touches both pieces at their ends, half a section from the hinge; 1e-5: its 60 points make a polygon."""
+    robot = sr.PccArm(segment_lengths=(0.2,), chain="lumped", hinges=1, muscle_azimuths=(), radius=0.03)
+    model = sr.load_model(robot)
+    y = [{"bend_x": bends[0], "bend_y": bends[1], "stretch": stretch}.get(n[12:], 0.0) for n in model.spring_joints]
+    (first, second) = [(start, end) for start, end, _ in cores(model, model.configuration([], y))]
+    corner, touching = first[1], 0.1 + min(stretch, 0.0)  # the second piece stretches, behind the bends
+    back, ahead = (first[0] - corner) / 0.1, (second[1] - second[0]) / 0.1
+    angle, line = np.arctan2(np.linalg.norm(np.cross(back, ahead)), -back @ ahead), [first[0]]
+    if angle > 1e-6:
+        inwards, across = ((way / np.linalg.norm(way)) for way in (back + ahead, ahead - back))
+        centre, bow = corner + touching / np.sin(angle / 2) * inwards, touching / np.tan(angle / 2)
+        turns = np.linspace(-0.5, 0.5, 60)[:, None] * angle
+        line += list(centre - bow * (np.cos(turns) * inwards - np.sin(turns) * across))
+    (bound,) = sr.capsule_error(model, [], y)
+    found = largest_error(np.array([*line, second[1]]), [first, second], 0.03)
+    assert touching * np.tan(angle / 4) - 2.5e-3 * (bound + 0.03) <= found <= bound + 1e-5
+
+
+def test_straight_links_are_exact_and_bad_coordinates_refused(arm: sr.SoftModel) -> None:
+    assert sr.capsule_error(arm, np.zeros(3)).shape == (0,)
+    with pytest.raises(sr.ParameterError, match="q_motors"):
+        sr.capsule_error(arm, [0.0])
+    bent = sr.load_model(sr.PccArm(elastic_sections=1, muscle_azimuths=()))
+    with pytest.raises(sr.ParameterError, match="range of every section"):
+        sr.capsule_error(bent, [], np.full(bent.n_springs, 3.0))

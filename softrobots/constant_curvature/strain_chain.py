@@ -146,15 +146,15 @@ def _positions(rotation: FloatArray, position: FloatArray) -> FloatArray:
     joints[..., 0] = np.arctan2(-y, z)
     joints[..., 1] = np.arctan2(x, across)
     joints[..., 2] = np.hypot(x, across)
-    turn = np.swapaxes(_universal(joints[..., 0], joints[..., 1]), -1, -2) @ rotation
+    turn = np.swapaxes(universal(joints[..., 0], joints[..., 1]), -1, -2) @ rotation
     joints[..., 3] = np.arctan2(-turn[..., 1, 2], turn[..., 2, 2])
     joints[..., 4] = np.arctan2(turn[..., 0, 2], np.hypot(turn[..., 1, 2], turn[..., 2, 2]))
     joints[..., 5] = np.arctan2(-turn[..., 0, 1], turn[..., 0, 0])
     return joints
 
 
-def _universal(about_x: FloatArray, about_y: FloatArray) -> FloatArray:
-    """`Rx Ry`, shape (..., 3, 3)."""
+def universal(about_x: FloatArray, about_y: FloatArray) -> FloatArray:
+    """Return `Rx(about_x) Ry(about_y)`, the axes of the chord in those of the start of a section, shape (..., 3, 3)."""
     sx, cx, sy, cy = np.sin(about_x), np.cos(about_x), np.sin(about_y), np.cos(about_y)
     rotation = np.zeros((*np.shape(about_x), 3, 3))
     rotation[..., 0, 0], rotation[..., 0, 2] = cy, sy
@@ -170,7 +170,7 @@ def _body_jacobian(joints: FloatArray) -> FloatArray:
     about_z = np.zeros((*c.shape, 3, 3))
     about_z[..., 0, 0], about_z[..., 0, 1], about_z[..., 1, 0], about_z[..., 1, 1] = c3, -s3, s3, c3
     about_z[..., 2, 2] = 1.0
-    spherical = _universal(r1, r2) @ about_z
+    spherical = universal(r1, r2) @ about_z
     jacobian = np.zeros((*c.shape, 6, 6))
     # Rows of `spherical` are the axes before the spherical joint, in the axes of the end
     x, y, z = (spherical[..., axis, :] for axis in range(3))
