@@ -18,6 +18,10 @@ PATH_COLOUR = 0x1A1A1A
 """Near black of the path: none of the colours of wrinkling and tensions."""
 FORCE_COLOUR = 0x009E73
 """Green of the forces."""
+CONTACT_COLOUR = 0x6633F2
+"""Violet of the points where a robot touches something, and of the forces there."""
+OBSTACLE_COLOUR = (0.40, 0.80, 0.80, 0.30)
+"""Red, green, blue, opacity of obstacles, as of glass."""
 FLOOR_COLOUR = 0xB8C0C8
 """Light grey of the lines on the floor."""
 TUBE_COLOUR = (0.85, 0.74, 0.50, 0.32)
@@ -33,6 +37,8 @@ ARROW_LENGTH = 0.2
 """Length of the arrow of the unit force, relative to the size of the robot; other arrows are in proportion."""
 ARROW_WIDTH = 0.009
 """Radius of the shaft of an arrow, relative to the size of the robot; its head is 2.5 times as wide and 7 times as long."""
+CONTACT_SIZE = 0.014
+"""Radius of the ball at a contact, relative to the size of the robot."""
 
 Colour = tuple[float, ...] | int
 """Red, green, blue and perhaps opacity in [0, 1], or a number as in HTML."""

@@ -2,14 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
 
-from softrobots.view.appearance import FORCE_COLOUR, LINE_COLOUR, PATH_COLOUR, RIGID_COLOUR, TAIL_COLOUR, TUBE_COLOUR, Colour
+from softrobots.view.appearance import (
+    CONTACT_COLOUR,
+    FORCE_COLOUR,
+    LINE_COLOUR,
+    OBSTACLE_COLOUR,
+    PATH_COLOUR,
+    RIGID_COLOUR,
+    TAIL_COLOUR,
+    TUBE_COLOUR,
+    Colour,
+)
 from softrobots.view.robot_shapes import Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Scene
+from softrobots.view.surroundings import DrawnContact
 from softrobots.view.tension_scale import ZERO_COLOUR, DrawnActuator, scale_end, tension_colour
 
 _MOST_NAMED = 12  # actuators that are listed one by one
@@ -51,13 +62,44 @@ def legend(
         entries.append(LegendEntry(TAIL_COLOUR, "wall that has not come out"))
     entries += tension_entries([state.actuators for state in played or (scene,)])
     entries += [LegendEntry(PATH_COLOUR, "path of the tip")] * path + [LegendEntry(PATH_COLOUR, "target (cross)")] * target
-    entries += [LegendEntry(FORCE_COLOUR, "force")] * any(state.arrows for state in states)
+    entries += [LegendEntry(FORCE_COLOUR, "force")] * any(not one.of_contact for state in states for one in state.arrows.values())
+    entries += [LegendEntry(OBSTACLE_COLOUR, "obstacle")] * any(state.obstacles for state in states)
+    entries += contact_entries([state.contacts for state in played or (scene,)])
     above = 1.0
     for least, colour in WRINKLING_COLOURS if scene.wrinkling else ():
         text = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if least > -np.inf else "wrinkled"
         entries.append(LegendEntry(colour, text))
         above = least
     return entries
+
+
+def contact_entries(states: Sequence[Mapping[str, DrawnContact]]) -> list[LegendEntry]:
+    """Return the contacts of some states of a robot: the size of the force of each obstacle on it, of many their range.
+
+    Args:
+        states: The contacts in each state.
+    """
+    names = dict.fromkeys(one.obstacle for state in states for one in state.values())
+    if not names:
+        return []
+    forces = {name: [_force_of(name, state) for state in states] for name in names}
+    if len(names) > _MOST_NAMED:
+        forces = {f"each of {len(names)} obstacles": [force for some in forces.values() for force in some]}
+    entries = [LegendEntry(CONTACT_COLOUR, f"{name} pushes with {_range(some)} N") for name, some in forces.items()]
+    if len(states) == 1:
+        slipping = dict.fromkeys(one.obstacle for one in states[0].values() if one.status == "slips")
+        entries += [LegendEntry(CONTACT_COLOUR, f"{name} slips") for name in slipping]
+    return entries
+
+
+def _force_of(obstacle: str, contacts: Mapping[str, DrawnContact]) -> float:
+    """Size of the force of an obstacle on a robot [N]."""
+    return float(np.linalg.norm(sum((one.force for one in contacts.values() if one.obstacle == obstacle), np.zeros(3))))
+
+
+def _range(forces: Sequence[float]) -> str:
+    least, most = (f"{number:.3g}" for number in (min(forces), max(forces)))
+    return least if least == most else f"{least} to {most}"
 
 
 def tension_entries(states: Sequence[Sequence[DrawnActuator]]) -> list[LegendEntry]:

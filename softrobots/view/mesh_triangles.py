@@ -1,4 +1,4 @@
-"""Triangles and colours of the meshes of a robot, for pictures.
+"""Triangles of solids, and triangles and colours of the meshes of a robot, for pictures.
 
 Pinocchio reads meshes through Coal (3.0), which joins the parts of a node into one list of corners but numbers the corners of
 every triangle from the first part, so that a mesh of several materials is torn. Files are therefore read again by trimesh,
@@ -15,7 +15,10 @@ import coal
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ViewerError
+from softrobots.view.body import tube
 
+_SIDES = 32  # corners of the cross-section of what is round
 _FARTHEST = 1e9  # [m]; sums and squares of corners must be finite in single precision
 
 
@@ -75,6 +78,35 @@ def has_finite_corners(geometry: Any) -> bool:
     if not isinstance(geometry, coal.BVHModelBase):
         return True
     return bool(np.all(np.abs(np.asarray(geometry.vertices())) <= _FARTHEST))  # NaN is not
+
+
+def triangles(geometry: Any) -> tuple[FloatArray, Any, bool]:
+    """Return corners and triangles of a shape, and whether the triangles are flat.
+
+    Raises:
+        ViewerError: If the shape is no box, cylinder, sphere or mesh.
+    """
+    if isinstance(geometry, Triangles):
+        return geometry.corners, geometry.faces, False
+    if isinstance(geometry, coal.Cylinder):
+        half = geometry.halfLength
+        return *revolved([-half, -half, half, half], np.full(4, geometry.radius)), False
+    if isinstance(geometry, coal.Sphere):
+        angles = np.linspace(0.0, np.pi, _SIDES // 2 + 1)
+        return *revolved(-geometry.radius * np.cos(angles), geometry.radius * np.sin(angles)), False
+    if isinstance(geometry, coal.Box):
+        from trimesh.creation import box
+
+        solid = box(2.0 * np.array(geometry.halfSide).ravel())
+        return np.array(solid.vertices), np.array(solid.faces), True
+    raise ViewerError(f"a {type(geometry).__name__} cannot be drawn; boxes, cylinders, spheres and meshes can")
+
+
+def revolved(heights: Any, radii: Any) -> tuple[FloatArray, Any]:
+    """Return corners and triangles of a body of revolution about z. A rim that is given twice is a sharp edge."""
+    centres = np.zeros((len(heights), 3))
+    centres[:, 2] = heights
+    return tube(np.tile(np.eye(3), (len(heights), 1, 1)), centres, radii, _SIDES)
 
 
 def _parts(file: Path, scale: FloatArray) -> tuple[ColouredPart, ...]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.motion import Motion
+from softrobots.environment.environment import Environment
 from softrobots.model.link_limits import link_limits
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
@@ -30,6 +31,7 @@ from softrobots.view.animation_frames import (
 )
 from softrobots.view.body import BentSections, SegmentBody
 from softrobots.view.robot_shapes import RobotShapes
+from softrobots.view.surroundings import DrawnContact, DrawnObstacle, drawn_contacts, drawn_obstacles
 from softrobots.view.tension_scale import DrawnActuator, drawn_actuators
 
 WRINKLING_COLOURS = (
@@ -44,6 +46,7 @@ WRINKLING_COLOURS = (
 lightness too, for grey prints and colour-blind readers."""
 
 _RINGS = 16  # of a body in each frame of a motion; two a section at least
+_SHEETS = 1.0  # side of the sheet that stands for a half-space, of the size of the robot
 _NO_FORCE = 1e-12  # [N], forces below have no arrow
 
 
@@ -54,6 +57,22 @@ class Arrow(NamedTuple):
     """Pose at its point of application, y along the force, shape (4, 4) [m]."""
     force: float
     """Magnitude [N]."""
+    of_contact: bool = False
+    """Whether it is that of a contact: its arrow ends at the point, outside of the robot, others start there."""
+
+    @classmethod
+    def of(cls, force: FloatArray, point: FloatArray, of_contact: bool = False) -> Arrow | None:
+        """The arrow of a force, shape (3,) [N], at a point, shape (3,) [m]; None if it is zero."""
+        size = float(np.linalg.norm(force))
+        if size <= _NO_FORCE:
+            return None
+        along = force / size
+        across = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
+        across /= np.linalg.norm(across)
+        pose = np.eye(4)
+        pose[:3, :3] = np.column_stack([across, along, np.cross(across, along)])
+        pose[:3, 3] = point
+        return cls(pose, size, of_contact)
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +92,11 @@ class Scene:
     actuators: Sequence[DrawnActuator] = ()
     """Its actuators, with their tensions under load."""
     arrows: Mapping[str, Arrow] = field(default_factory=dict)
-    """Forces by the frame that they act on."""
+    """Forces by the frame that they act on, and those of contacts."""
+    obstacles: Sequence[DrawnObstacle] = ()
+    """The obstacles around it."""
+    contacts: Mapping[str, DrawnContact] = field(default_factory=dict)
+    """Where it touches them."""
     grown: float | None = None
     """Share of a growing tube that has everted; None if the robot does not grow."""
 
@@ -124,6 +147,7 @@ class SceneBuilder:
         tip = np.array(frame_placement(model, q, model.tip).translation)
         self.extent = Extent(base, tip, size, -0.15 * size if ground is None else ground)
         """Size and place of the robot at rest."""
+        self._drawn: dict[Environment | None, tuple[DrawnObstacle, ...]] = {}
 
     def relaxed(self) -> Scene:
         """Return the robot at rest, without load."""
@@ -179,9 +203,10 @@ class SceneBuilder:
         )
         if equilibrium is not None:
             load, tensions = equilibrium.load, equilibrium.muscle_forces
+            contacts = drawn_contacts(equilibrium)
             levels = [wrinkling_level(equilibrium, link) for link in range(len(model.spring_groups))]
         elif frame.load is not None:
-            load, tensions = frame.load, frame.tensions
+            load, tensions, contacts = frame.load, frame.tensions, {}
             levels = self._moving_levels(frame, load, q)
         else:
             return scene
@@ -189,7 +214,9 @@ class SceneBuilder:
             scene,
             wrinkling=levels,
             actuators=drawn_actuators(model.muscles, curves, tensions),
-            arrows=_arrows(model, load, q),
+            arrows=_arrows(model, load, q, contacts),
+            obstacles=self._obstacles(load.environment),
+            contacts=contacts,
         )
 
     def _moving_levels(self, frame: Frame, load: Load, q: FloatArray) -> list[int]:
@@ -199,6 +226,14 @@ class SceneBuilder:
         limits = link_limits(self._model, load.wrenches, load.gravity, q=q, torques=torques, tensions=frame.tensions)
         flat = [not beyond.isdisjoint(group.springs) for group in groups]
         return [_level(left, one) for left, one in zip(limits.wrinkling_margins.tolist(), flat, strict=True)]
+
+    def _obstacles(self, environment: Environment | None) -> tuple[DrawnObstacle, ...]:
+        """The obstacles of an environment; the same objects for the same one."""
+        if environment not in self._drawn:
+            middle = 0.5 * (self.extent.base + self.extent.tip)
+            ground = min(self.extent.ground, self.extent.tip[2])
+            self._drawn[environment] = drawn_obstacles(environment, middle, _SHEETS * self.extent.size, ground)
+        return self._drawn[environment]
 
     def _reference(self) -> str:
         model = self._model
@@ -219,19 +254,11 @@ def _level(left: float, saturated: bool) -> int:
     return next(level for level, (least, _) in enumerate(WRINKLING_COLOURS) if left >= least)
 
 
-def _arrows(model: SoftModel, load: Load, q: FloatArray) -> dict[str, Arrow]:
-    """Forces of a load by frame, at a configuration, shape (nq,)."""
-    arrows = {}
-    for frame, wrench in load.wrenches.items():
-        force = wrench[:3]
-        size = float(np.linalg.norm(force))
-        if size <= _NO_FORCE:
-            continue
-        along = force / size
-        across = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
-        across /= np.linalg.norm(across)
-        pose = np.eye(4)
-        pose[:3, :3] = np.column_stack([across, along, np.cross(across, along)])
-        pose[:3, 3] = frame_placement(model, q, frame).translation
-        arrows[frame] = Arrow(pose, size)
-    return arrows
+def _arrows(model: SoftModel, load: Load, q: FloatArray, contacts: Mapping[str, DrawnContact]) -> dict[str, Arrow]:
+    """Forces of a load by frame, at a configuration, shape (nq,), and those of contacts by their names."""
+    arrows = {
+        frame: Arrow.of(wrench[:3], np.array(frame_placement(model, q, frame).translation))
+        for frame, wrench in load.wrenches.items()
+    }
+    arrows |= {f"contact/{name}": Arrow.of(one.force, one.point, True) for name, one in contacts.items()}
+    return {name: arrow for name, arrow in arrows.items() if arrow is not None}

@@ -13,6 +13,7 @@ from softrobots.statics.kinematics import backbone
 from softrobots.view.actuator_curves import actuator_curves
 from softrobots.view.body import BentSections, body_at
 from softrobots.view.figures.canvas import COLOURS, equal_box, force_arrow, new_space, plain_words
+from softrobots.view.figures.surroundings import draw_surroundings
 from softrobots.view.legend import tension_entries
 from softrobots.view.tension_scale import drawn_actuators, scale_end, tension_colour
 
@@ -44,7 +45,8 @@ def loaded_shape(equilibrium: Equilibrium) -> Any:
     axes.plot(*relaxed.T, color=_RELAXED, lw=1.2, ls=":", label="relaxed springs, same motors")
     axes.plot(*loaded.T, color=_LOADED, lw=2.5, marker="o", ms=4.0, label="loaded")
     arrow = force_arrow(axes, equilibrium)
-    equal_box(axes, np.vstack([loaded, relaxed, arrow]))
+    around = draw_surroundings(axes, equilibrium, loaded)
+    equal_box(axes, np.vstack([loaded, relaxed, arrow, around]))
     axes.legend(loc="upper left", fontsize=9)
     return figure
 
@@ -89,7 +91,8 @@ def shape(equilibrium: Equilibrium) -> Any:
     for curve, tension, slack in actuators:
         axes.plot(*curve.shown.T, color=tension_colour(tension, end), lw=1.6, ls=_DASHED if slack else "-")
     arrow = force_arrow(axes, equilibrium)
-    equal_box(axes, np.concatenate([arrow, *(segment.backbone for segment in (*segments, *unloaded))]))
+    around = draw_surroundings(axes, equilibrium, np.concatenate([segment.backbone for segment in segments]))
+    equal_box(axes, np.concatenate([arrow, around, *(segment.backbone for segment in (*segments, *unloaded))]))
     handles, labels = axes.get_legend_handles_labels()
     named = dict(zip(labels, handles, strict=True))  # one line of each meaning
     for colour, meaning, dashed in tension_entries([actuators]):

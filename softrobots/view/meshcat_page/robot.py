@@ -13,6 +13,7 @@ from softrobots.view.animation_frames import FRAME_RATE
 from softrobots.view.legend import LegendEntry, legend
 from softrobots.view.meshcat_page.body import BodyDrawing
 from softrobots.view.meshcat_page.shapes import material, meshcat_geometry
+from softrobots.view.meshcat_page.surroundings import SurroundingsDrawing
 from softrobots.view.robot_shapes import RobotShapes, Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Arrow, Scene
 
@@ -36,6 +37,7 @@ class RobotDrawing:
         self._arrows = ArrowDrawing(root["load"], size)
         self._chain = ChainDrawing(root, robot.shapes)
         self._body = BodyDrawing(root["body"])
+        self._surroundings = SurroundingsDrawing(root, size)
         self._traced = self._marked = False
         self._animated: tuple[Scene, ...] = ()
         self.notes: list[LegendEntry] = []
@@ -48,6 +50,7 @@ class RobotDrawing:
         self._chain.draw(scene)
         self._body.draw(scene)
         self._arrows.draw(scene.arrows)
+        self._surroundings.draw([scene])
 
     def trace(self, positions: FloatArray) -> None:
         """Draw a path, shape (n, 3) [m], as dots."""
@@ -88,6 +91,7 @@ class RobotDrawing:
         animation = meshcat.animation.Animation(default_framerate=FRAME_RATE)
         numbers = list(scenes)
         self._arrows.draw_largest(scenes.values())
+        self._surroundings.draw(list(scenes.values()))
         for (number, scene), following in zip(scenes.items(), (*numbers[1:], numbers[-1]), strict=True):
             self._add_frame(animation, number, scene)
             # A body changes in steps, and so must the chain inside; that of a growing tube is hidden.
@@ -106,6 +110,7 @@ class RobotDrawing:
     def _add_frame(self, animation: Any, number: int, scene: Scene) -> None:
         self._chain.add_frame(animation, number, scene)
         self._arrows.add_frame(animation, number, scene.arrows)
+        self._surroundings.add_frame(animation, number, scene)
 
 
 class ChainDrawing:
@@ -202,15 +207,17 @@ class ArrowDrawing:
         for name, arrow in arrows.items():
             length = appearance.ARROW_LENGTH * self._size * arrow.force / unit
             width = appearance.ARROW_WIDTH * self._size
-            green = geometry.MeshLambertMaterial(color=appearance.FORCE_COLOUR)
+            begin = -(length + 7.0 * width) if arrow.of_contact else 0.0
+            colour = appearance.CONTACT_COLOUR if arrow.of_contact else appearance.FORCE_COLOUR
+            look = geometry.MeshLambertMaterial(color=colour)
             node = self._root[name]
             for part, solid, height in (
                 ("shaft", geometry.Cylinder(length, width), 0.5 * length),
                 ("head", geometry.Cylinder(7.0 * width, radiusTop=0.0, radiusBottom=2.5 * width), length + 3.5 * width),
             ):
-                node[part].set_object(solid, green)
+                node[part].set_object(solid, look)
                 raised = np.eye(4)
-                raised[1, 3] = height
+                raised[1, 3] = begin + height
                 node[part].set_transform(raised)
             node.set_transform(arrow.pose)
 

@@ -10,15 +10,12 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import ViewerError
 from softrobots.view import appearance
 from softrobots.view.appearance import Colour, body_parts, rgb
-from softrobots.view.body import tube
-from softrobots.view.mesh_triangles import Triangles
+from softrobots.view.mesh_triangles import revolved, triangles
 from softrobots.view.robot_shapes import Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Extent, Scene
 
-_SIDES = 32  # corners of the cross-section of what is round
 _AMBIENT, _SUN = 2.2, 2.0  # strength of the light from everywhere and from above
 
 
@@ -105,9 +102,20 @@ class ViserDrawing:
         radii = width * np.array([1.0, 1.0, 1.0, 1.0, 2.5, 2.5, 0.0, 0.0])
         for name, arrow in scene.arrows.items():
             end = appearance.ARROW_LENGTH * self._extent.size * arrow.force / self._unit_force
-            heights = [0.0, 0.0, end, end, end, end, end + 7.0 * width, end + 7.0 * width]
+            heights = np.array([0.0, 0.0, end, end, end, end, end + 7.0 * width, end + 7.0 * width])
             along_z = arrow.pose[:, [2, 0, 1, 3]]
-            yield f"load/{name}", Mesh(*_turned(heights, radii), along_z, appearance.FORCE_COLOUR)
+            if arrow.of_contact:
+                yield f"load/{name}", Mesh(*revolved(heights - heights[-1], radii), along_z, appearance.CONTACT_COLOUR)
+            else:
+                yield f"load/{name}", Mesh(*revolved(heights, radii), along_z, appearance.FORCE_COLOUR)
+        for number, obstacle in enumerate(scene.obstacles):
+            corners, faces, flat = triangles(obstacle.geometry)
+            yield f"obstacles/{number}", Mesh(corners, faces, obstacle.pose, appearance.OBSTACLE_COLOUR, flat)
+        ball = triangles(coal.Sphere(appearance.CONTACT_SIZE * self._extent.size))[:2]
+        for name, contact in scene.contacts.items():
+            placed = np.eye(4)
+            placed[:3, 3] = contact.point
+            yield f"contacts/{name}", Mesh(*ball, placed, appearance.CONTACT_COLOUR)
 
     def _show_mesh(self, name: str, mesh: Mesh) -> None:
         x, y, z, w = pin.Quaternion(mesh.pose[:3, :3]).coeffs().tolist()
@@ -121,32 +129,3 @@ class ViserDrawing:
         self.handles[name] = self._server.scene.add_mesh_simple(
             f"/{name}", mesh.corners, mesh.faces, color=colour, **look, **place
         )
-
-
-def triangles(geometry: Any) -> tuple[FloatArray, Any, bool]:
-    """Return corners and triangles of a shape, and whether the triangles are flat.
-
-    Raises:
-        ViewerError: If the shape is no box, cylinder, sphere or mesh.
-    """
-    if isinstance(geometry, Triangles):
-        return geometry.corners, geometry.faces, False
-    if isinstance(geometry, coal.Cylinder):
-        half = geometry.halfLength
-        return *_turned([-half, -half, half, half], np.full(4, geometry.radius)), False
-    if isinstance(geometry, coal.Sphere):
-        angles = np.linspace(0.0, np.pi, _SIDES // 2 + 1)
-        return *_turned(-geometry.radius * np.cos(angles), geometry.radius * np.sin(angles)), False
-    if isinstance(geometry, coal.Box):
-        from trimesh.creation import box
-
-        solid = box(2.0 * np.array(geometry.halfSide).ravel())
-        return np.array(solid.vertices), np.array(solid.faces), True
-    raise ViewerError(f"a {type(geometry).__name__} cannot be drawn; boxes, cylinders, spheres and meshes can")
-
-
-def _turned(heights: Any, radii: Any) -> tuple[FloatArray, Any]:
-    """Corners and triangles of a body of revolution about z. A rim that is given twice is a sharp edge."""
-    centres = np.zeros((len(heights), 3))
-    centres[:, 2] = heights
-    return tube(np.tile(np.eye(3), (len(heights), 1, 1)), centres, radii, _SIDES)

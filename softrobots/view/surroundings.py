@@ -1,0 +1,112 @@
+"""What a robot touches, as it is drawn: obstacles as solids, and its contacts with them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import coal
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.environment.environment import Environment
+from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
+from softrobots.environment.environment import Mesh
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.view.mesh_triangles import Triangles
+
+_SHEET = 0.01  # thickness of the sheet that stands for a half-space, of its side
+_ROUND = (16, 32)  # rings and corners of the ends of a capsule
+
+
+class DrawnObstacle(NamedTuple):
+    """An obstacle."""
+
+    name: str
+    """Its name in the environment."""
+    geometry: Any
+    """A `coal` shape, or the `softrobots.view.mesh_triangles.Triangles` of others."""
+    pose: FloatArray
+    """Pose of the axes of the geometry in the world, shape (4, 4) [m]."""
+
+
+class DrawnContact(NamedTuple):
+    """A place where a robot touches an obstacle, or itself."""
+
+    obstacle: str
+    """Name of the obstacle."""
+    point: FloatArray
+    """Position on the surface of the robot, shape (3,) [m], world axes."""
+    force: FloatArray
+    """Force on the robot, shape (3,) [N], world axes."""
+    status: str
+    """`Contact.status`."""
+
+
+def drawn_obstacles(
+    environment: Environment | None, centre: FloatArray, size: float, ground: float = -np.inf
+) -> tuple[DrawnObstacle, ...]:
+    """Return the obstacles of an environment as solids.
+
+    A half-space is drawn as a square sheet whose face towards the free side lies in its plane.
+
+    Args:
+        environment: An environment whose obstacles stand still, or None.
+        centre: Point whose projection is the middle of a sheet, shape (3,) [m].
+        size: Side of a sheet [m].
+        ground: Height on which upright sheets stand if they would reach below [m].
+
+    Returns:
+        One for each obstacle, in their order.
+    """
+    if environment is None:
+        return ()
+    named = zip(environment.names, environment.obstacles, strict=True)
+    return tuple(DrawnObstacle(name, *_solid(obstacle, centre, size, ground)) for name, obstacle in named)
+
+
+def drawn_contacts(equilibrium: Equilibrium) -> dict[str, DrawnContact]:
+    """Return the contacts of an equilibrium, by link, obstacle and a number where they touch in several places."""
+    found: dict[str, DrawnContact] = {}
+    for contact in equilibrium.contacts:
+        place = f"{contact.link}/{contact.obstacle}"
+        number = sum(name.startswith(f"{place}/") for name in found)
+        found[f"{place}/{number}"] = DrawnContact(contact.obstacle, contact.point, contact.force, contact.status)
+    return found
+
+
+def _solid(obstacle: Any, centre: FloatArray, size: float, ground: float) -> tuple[Any, FloatArray]:
+    """Geometry of an obstacle and its pose."""
+    if isinstance(obstacle, HalfSpace):
+        return _sheet(obstacle, centre, size, ground)
+    pose = obstacle.transform_to_world
+    match obstacle:
+        case Sphere():
+            return coal.Sphere(obstacle.radius), pose
+        case Box():
+            return coal.Box(*obstacle.size), pose
+        case Cylinder():
+            return coal.Cylinder(obstacle.radius, obstacle.length), pose
+        case Capsule():
+            from trimesh.creation import capsule
+
+            solid = capsule(height=obstacle.length, radius=obstacle.radius, count=_ROUND)
+            return Triangles(np.array(solid.vertices), np.array(solid.faces)), pose
+        case Mesh():
+            return Triangles(np.array(obstacle.vertices), np.array(obstacle.faces)), pose
+
+
+def _sheet(wall: HalfSpace, centre: FloatArray, size: float, ground: float) -> tuple[Any, FloatArray]:
+    """A flat box behind the plane of a half-space, an edge of it level."""
+    normal, origin = wall.transform_to_world[:3, 2], wall.transform_to_world[:3, 3]
+    level = np.cross((0.0, 0.0, 1.0), normal)
+    lying = np.linalg.norm(level) < 0.5
+    level = np.array((1.0, 0.0, 0.0)) if np.linalg.norm(level) < 1e-9 else level / np.linalg.norm(level)
+    up = np.cross(normal, level)
+    middle = centre - (centre - origin) @ normal * normal
+    if not lying:
+        middle = middle + max(ground + 0.5 * size * up[2] - middle[2], 0.0) / up[2] * up
+    pose, thick = np.eye(4), _SHEET * size
+    pose[:3, :3] = np.column_stack([level, up, normal])
+    pose[:3, 3] = middle - 0.5 * thick * normal
+    return coal.Box(size, size, thick), pose
