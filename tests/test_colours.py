@@ -10,7 +10,16 @@ from itertools import combinations, pairwise
 import numpy as np
 import pytest
 
-from softrobots.view.appearance import FORCE_COLOUR, LINE_COLOUR, PATH_COLOUR, TAIL_COLOUR, TUBE_COLOUR
+from softrobots.view.appearance import (
+    CONTACT_COLOUR,
+    FORCE_COLOUR,
+    LINE_COLOUR,
+    OBSTACLE_COLOUR,
+    PATH_COLOUR,
+    RIGID_COLOUR,
+    TAIL_COLOUR,
+    TUBE_COLOUR,
+)
 from softrobots.view.figures import canvas, helix_sheet, trajectories, workspaces
 from softrobots.view.scene import WRINKLING_COLOURS
 from softrobots.view.tension_scale import tension_colour
@@ -67,7 +76,8 @@ TENSIONS = [tension_colour(share, 1.0) for share in (-1.0, -0.5, -0.01, 0.0, 0.0
 PALETTES = {
     "lines": list(canvas.COLOURS),
     "wrinkling": WRINKLING,
-    "page of a muscle arm": [*TENSIONS, TUBE_COLOUR, PATH_COLOUR, FORCE_COLOUR],
+    "page of a muscle arm": [*TENSIONS, TUBE_COLOUR, PATH_COLOUR, FORCE_COLOUR, CONTACT_COLOUR, OBSTACLE_COLOUR],
+    "page of a leaning arm": [*WRINKLING, RIGID_COLOUR, PATH_COLOUR, FORCE_COLOUR, CONTACT_COLOUR, OBSTACLE_COLOUR],
     "page of a growing tube": [LINE_COLOUR, TUBE_COLOUR, TAIL_COLOUR],
     "maps": list(workspaces.SHADES),
     "helices": [helix_sheet.WALL, helix_sheet.WALL_IN_CONTACT, helix_sheet.ACTUATOR, helix_sheet.OPPOSITE],

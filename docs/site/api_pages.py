@@ -134,7 +134,14 @@ PAGES = {
         "Viewer",
         "The robot in a browser: as a page on loopback, as a file of its own, with sliders, or following commands.",
         (
-            *_top("view", "Viewer", "view.meshcat_page.page_text.InlinePage", "view.slider_page.SliderPage"),
+            *_top(
+                "view",
+                "Viewer",
+                "view.written_page.WrittenPage",
+                "view.served_page.ServedPage",
+                "view.meshcat_page.page_text.InlinePage",
+                "view.slider_page.SliderPage",
+            ),
             *_top("view.identification_page.IdentificationPage"),
             *_top("view.live.loop.LiveView", "view.live.commands.Wanted", "view.live.commands.GRAMMAR", "view.live.keys.KEYS"),
         ),

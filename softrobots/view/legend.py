@@ -24,6 +24,7 @@ from softrobots.view.surroundings import DrawnContact
 from softrobots.view.tension_scale import ZERO_COLOUR, DrawnActuator, scale_end, tension_colour
 
 _MOST_NAMED = 12  # actuators that are listed one by one
+_NO_FORCE = 1e-9  # [N], contacts with less only touch
 _ZERO = 1e-9  # of the end of the scale: tensions below are told as zero
 
 
@@ -62,7 +63,9 @@ def legend(
         entries.append(LegendEntry(TAIL_COLOUR, "wall that has not come out"))
     entries += tension_entries([state.actuators for state in played or (scene,)])
     entries += [LegendEntry(PATH_COLOUR, "path of the tip")] * path + [LegendEntry(PATH_COLOUR, "target (cross)")] * target
-    entries += [LegendEntry(FORCE_COLOUR, "force")] * any(not one.of_contact for state in states for one in state.arrows.values())
+    entries += [LegendEntry(FORCE_COLOUR, "force")] * any(
+        not one.of_contact for state in states for one in state.arrows.values()
+    )
     entries += [LegendEntry(OBSTACLE_COLOUR, "obstacle")] * any(state.obstacles for state in states)
     entries += contact_entries([state.contacts for state in played or (scene,)])
     above = 1.0
@@ -85,7 +88,7 @@ def contact_entries(states: Sequence[Mapping[str, DrawnContact]]) -> list[Legend
     forces = {name: [_force_of(name, state) for state in states] for name in names}
     if len(names) > _MOST_NAMED:
         forces = {f"each of {len(names)} obstacles": [force for some in forces.values() for force in some]}
-    entries = [LegendEntry(CONTACT_COLOUR, f"{name} pushes with {_range(some)} N") for name, some in forces.items()]
+    entries = [LegendEntry(CONTACT_COLOUR, _push(name, some)) for name, some in forces.items()]
     if len(states) == 1:
         slipping = dict.fromkeys(one.obstacle for one in states[0].values() if one.status == "slips")
         entries += [LegendEntry(CONTACT_COLOUR, f"{name} slips") for name in slipping]
@@ -97,9 +100,12 @@ def _force_of(obstacle: str, contacts: Mapping[str, DrawnContact]) -> float:
     return float(np.linalg.norm(sum((one.force for one in contacts.values() if one.obstacle == obstacle), np.zeros(3))))
 
 
-def _range(forces: Sequence[float]) -> str:
+def _push(obstacle: str, forces: Sequence[float]) -> str:
+    """The least and the most force of an obstacle in words [N]."""
     least, most = (f"{number:.3g}" for number in (min(forces), max(forces)))
-    return least if least == most else f"{least} to {most}"
+    if max(forces) <= _NO_FORCE:
+        return f"touches {obstacle}"
+    return f"{obstacle} pushes with {least if least == most else f'{least} to {most}'} N"
 
 
 def tension_entries(states: Sequence[Sequence[DrawnActuator]]) -> list[LegendEntry]:

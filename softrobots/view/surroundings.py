@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import coal
@@ -11,7 +10,6 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
-from softrobots.environment.environment import Mesh
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.view.mesh_triangles import Triangles
 
@@ -61,8 +59,7 @@ def drawn_obstacles(
     """
     if environment is None:
         return ()
-    named = zip(environment.names, environment.obstacles, strict=True)
-    return tuple(DrawnObstacle(name, *_solid(obstacle, centre, size, ground)) for name, obstacle in named)
+    return tuple(DrawnObstacle(str(one.name), *_solid(one, centre, size, ground)) for one in environment)
 
 
 def drawn_contacts(equilibrium: Equilibrium) -> dict[str, DrawnContact]:
@@ -92,8 +89,7 @@ def _solid(obstacle: Any, centre: FloatArray, size: float, ground: float) -> tup
 
             solid = capsule(height=obstacle.length, radius=obstacle.radius, count=_ROUND)
             return Triangles(np.array(solid.vertices), np.array(solid.faces)), pose
-        case Mesh():
-            return Triangles(np.array(obstacle.vertices), np.array(obstacle.faces)), pose
+    return Triangles(np.array(obstacle.vertices), np.array(obstacle.faces)), pose
 
 
 def _sheet(wall: HalfSpace, centre: FloatArray, size: float, ground: float) -> tuple[Any, FloatArray]:

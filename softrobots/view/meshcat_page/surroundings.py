@@ -49,8 +49,8 @@ class SurroundingsDrawing:
 
     def add_frame(self, animation: Any, number: int, scene: Scene) -> None:
         """Move obstacles and points to their places at a frame of an animation of scenes that are drawn."""
-        for place, (drawn, now) in enumerate(zip(self._drawn, scene.obstacles, strict=True)):
-            animation.at_frame(self._obstacles[str(place)], number).set_transform(now.pose)
+        for place, obstacle in enumerate(scene.obstacles):
+            animation.at_frame(self._obstacles[str(place)], number).set_transform(obstacle.pose)
         for name in self._named:
             at_frame = animation.at_frame(self._points[name], number)
             at_frame.set_property("visible", "boolean", name in scene.contacts)
