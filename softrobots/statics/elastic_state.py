@@ -19,6 +19,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.coordinates import Point, ReducedLoad
 from softrobots.model.friction_coordinates import MOST_ROUNDS, SAME_FRICTION, gripped
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.contact.touch import NO_FORCES, ForceTable, NearSurfaces, Touch, joined, resting_forces
 from softrobots.statics.loads import AppliedLoad, Load
 
 TOLERANCE = 1e-10
@@ -54,6 +55,8 @@ class ElasticState(NamedTuple):
     """Elastic energy plus potential of the load [J]; infinite where a section is beyond its range."""
     error: float
     """Norm of the residual; infinite where a section is beyond its range, or the friction of guides does not settle."""
+    touch: Touch | None = None
+    """The surfaces around with the contact forces, which residual, tangent stiffness and load contain; None in free space."""
 
     @property
     def q(self) -> FloatArray:
@@ -69,20 +72,32 @@ class ElasticProblem:
         self.model, self.q_motors, self.load, self.tolerance = model, q_motors, load, tolerance
         self._coordinates, self._springs, self._reach = model.coordinates, model.springs, model.reach
         self._applied = AppliedLoad(model, load)
+        self._surfaces = None if load.environment is None else NearSurfaces(model, load.environment)
 
-    def state(self, q_springs: FloatArray) -> ElasticState:
-        """Evaluate residual, tangent stiffness and energy at elastic coordinates, shape (n_springs,) [rad or m]."""
+    def state(self, q_springs: FloatArray, forces: ForceTable = NO_FORCES) -> ElasticState:
+        """Evaluate residual, tangent stiffness and energy at elastic coordinates, shape (n_springs,) [rad or m].
+
+        In contact with obstacles with the forces given; the tangent stiffness is the Hessian of the Lagrangian then.
+        """
         point = self._coordinates.at(self.q_motors, q_springs)
         if not point.valid:
             return _out_of_range(self.model, q_springs, point)
+        touch = None
         joints = self._applied.nothing or self._applied.at(self.model.embed(point.joints))
-        reduced = point.reduce(joints)
+        if self._surfaces is None:
+            reduced = point.reduce(joints)
+        else:
+            touch = self._surfaces.at(self.model.embed(point.joints), point, forces)
+            joints = joined(joints, touch.load)
+            reduced = _with_curvature(point, point.reduce(joints), touch)
         stored, torques, stiffness = self._springs.at(q_springs)
         residual = torques - reduced.elastic
         tangent = stiffness - reduced.derivative
         energy = stored + joints.potential + reduced.potential
         scale = joints.scale + reduced.scale * self._reach
-        return ElasticState(q_springs, self.model, point, reduced, torques, scale, residual, tangent, energy, norm(residual))
+        return ElasticState(
+            q_springs, self.model, point, reduced, torques, scale, residual, tangent, energy, norm(residual), touch
+        )
 
     def balanced(self, state: ElasticState) -> bool:
         """Whether the residual meets the tolerance."""
@@ -110,12 +125,34 @@ def elastic_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
 def rubbing_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> tuple[SoftModel, ElasticState]:
     """Evaluate the same, and return the robot with the friction that its guides have there; the robot itself without guides."""
     with one_blas_thread(model.n_springs):
-        state = ElasticProblem(model, q_motors, load).state(q_springs)
+        state = _evaluated(model, q_motors, q_springs, load)
         change, rounds = math.inf if model.structure.guided else 0.0, 0
         while change > SAME_FRICTION and rounds < MOST_ROUNDS:
             model, change = gripped(model, q_motors, q_springs, state.load.motors)
-            state, rounds = ElasticProblem(model, q_motors, load).state(q_springs), rounds + 1
+            state, rounds = _evaluated(model, q_motors, q_springs, load), rounds + 1
         return model, state if change <= SAME_FRICTION else state._replace(error=math.inf)
+
+
+def _evaluated(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:
+    """State at coordinates; in contact with the forces that balance best there."""
+    problem = ElasticProblem(model, q_motors, load)
+    state = problem.state(q_springs)
+    if state.touch is None:
+        return state
+    forces = resting_forces(state.touch, state.residual, model.reach)
+    return problem.state(q_springs, ForceTable(state.touch.gaps.keys, forces)) if forces.any() else state
+
+
+def _with_curvature(point: Point, reduced: ReducedLoad, touch: Touch) -> ReducedLoad:
+    """Add the curvature of gaps to the derivatives of a load."""
+    rows, weights = touch.curvature
+    if not len(weights):
+        return reduced
+    by_motors, by_springs = point.columns(rows)
+    bent = (by_springs.T * weights) @ by_springs
+    return reduced._replace(
+        derivative=reduced.derivative + bent, coupling=reduced.coupling + (by_springs.T * weights) @ by_motors
+    )
 
 
 def _out_of_range(model: SoftModel, q_springs: FloatArray, point: Point) -> ElasticState:

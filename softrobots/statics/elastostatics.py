@@ -68,7 +68,10 @@ def solve_springs(
         state is stable (see `softrobots.statics.stability`).
     """
     most = MOST_ITERATIONS[method] if max_iterations is None else max_iterations
-    solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
+    if load.environment is not None:
+        from softrobots.statics.contact.solver import settle as solve
+    else:
+        solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
     with one_blas_thread(model.n_springs):
         state, spent, stable = solve(ElasticProblem(model, q_motors, load, tolerance), start, most)
         while model.structure.guided:  # the friction of guides follows the tensions

@@ -6,9 +6,13 @@ from typing import Any
 
 from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.environment.environment import Environment
 from softrobots.model.friction_coordinates import after_step, untouched
 from softrobots.model.link_limits import near_largest_moment
 from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.contact.certificate import active_contacts
+from softrobots.statics.contact.contact import contacts_of
+from softrobots.statics.contact.touch import TOUCHING, deepest_penetration
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual, rubbing_state
 from softrobots.statics.elastostatics import METHODS, solve_springs
 from softrobots.statics.equilibrium_result import Equilibrium, check_same_model
@@ -31,6 +35,7 @@ def solve_equilibrium(
     previous: Equilibrium | None = None,
     tolerance: float = TOLERANCE,
     max_iterations: int | None = None,
+    environment: Environment | None = None,
 ) -> Equilibrium:
     """Find the static equilibrium of the springs at given motor coordinates.
 
@@ -51,6 +56,7 @@ def solve_equilibrium(
         previous: Where the robot comes from: what dry friction remembers, and the start unless `q_springs0` is given.
         tolerance: Largest residual, relative to `max(|f| reach + |moment| + |g|, 1e-3 N m)`.
         max_iterations: Limit of evaluations; 200 for "newton", 1000 for "fixed_point" by default.
+        environment: Obstacles that the robot touches without friction; only with "newton", and without moments.
 
     Returns:
         The equilibrium with its certificate.
@@ -63,7 +69,9 @@ def solve_equilibrium(
     choice("method", method, METHODS)
     model = untouched(check_model(model))
     motors = model.checked_motors(q_motors)
-    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity, environment=environment)
+    if environment is not None and method != "newton":
+        raise ParameterError("method", method, "'newton' in contact with an environment")
     relaxed = model.rest
     if previous is not None:
         check_same_model(model, previous, "previous")
@@ -82,7 +90,7 @@ def solve_equilibrium(
     if not result.converged:
         raise EquilibriumNotFound(
             f"no equilibrium by {method!r} in {iterations} iterations: residual {result.residual:.3g} N m, required "
-            f"{result.tolerance:.3g} N m" + _hint(result),
+            f"{result.tolerance:.3g} N m" + _hint(result, state),
             best=result,
             residual=result.residual,
             iterations=iterations,
@@ -90,8 +98,10 @@ def solve_equilibrium(
     return result
 
 
-def _hint(best: Equilibrium) -> str:
+def _hint(best: Equilibrium, state: ElasticState) -> str:
     """Advice for the error message."""
+    if state.touch is not None and state.touch.penetration > TOUCHING * best.model.reach:
+        return f"; {deepest_penetration(state.touch)}"
     ends = best.model.structure.at_range_end(best.q_motors, best.q_springs)
     if ends:
         return (
@@ -121,6 +131,14 @@ def equilibrium_from_state(
     """Result of a state; `stable` if it is already known."""
     if model.structure.friction is not None:
         model, state = rubbing_state(model, q_motors, state.q_springs, load)
+    allowed = largest_residual(model, state.scale, tolerance)
+    contacts: dict[str, Any] = {}
+    if state.touch is not None:
+        active = active_contacts(state.touch, model.reach, allowed)
+        contacts = {
+            "contacts": contacts_of(state.touch, active),
+            "contact_gradients": read_only(state.touch.rows[active.pressed]),
+        }
     return Equilibrium(
         model=model,
         load=load,
@@ -133,7 +151,8 @@ def equilibrium_from_state(
         tangent_stiffness=read_only(state.tangent),
         coupling=read_only(state.load.coupling),
         residual=state.error,
-        tolerance=largest_residual(model, state.scale, tolerance),
+        tolerance=allowed,
         iterations=iterations,
-        stable=is_stable(model, load, state) if stable is None else stable,
+        stable=is_stable(model, load, state, tolerance) if stable is None else stable,
+        **contacts,
     )

@@ -14,7 +14,9 @@ from softrobots.core.errors import ParameterError
 from softrobots.model.actuators import slack_tendons
 from softrobots.model.link_limits import LinkLimits, link_limits, link_moments
 from softrobots.model.soft_model import SoftModel, check_model
-from softrobots.statics.contact.contact import Contact
+from softrobots.statics.contact.certificate import null_space
+from softrobots.statics.contact.contact import Contact, with_contacts
+from softrobots.statics.contact.touch import TOUCHING
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.stability import Stability, stability
@@ -46,9 +48,12 @@ class Equilibrium:
     motor_torques: FloatArray
     """Load on each motor, `J_m^T w - g_m`, shape (n_motors,) [N m or N]."""
     tangent_stiffness: FloatArray
-    """Derivative of the residual, shape (n_springs, n_springs)."""
+    """Derivative of the residual, shape (n_springs, n_springs); in contact the Hessian of the Lagrangian."""
     coupling: FloatArray
-    """Derivative of the load on the elastic coordinates with respect to the actuators, shape (n_springs, n_motors)."""
+    """Derivative of the load on the elastic coordinates with respect to the actuators, shape (n_springs, n_motors).
+
+    In contact at constant contact forces.
+    """
     residual: float
     """Norm of the out-of-balance torque [N m]."""
     tolerance: float
@@ -67,7 +72,21 @@ class Equilibrium:
     def stability(self) -> Stability:
         """Stable, neutral, divergent or flutter, with the eigenvalues that say so."""
         point = self.model.coordinates.at(self.q_motors, self.q_springs)
-        return stability(self.model, point, self.q, self.tangent_stiffness)
+        return stability(self.model, point, self.q, self.tangent_stiffness, self._free_motions)
+
+    @cached_property
+    def _free_motions(self) -> FloatArray | None:
+        """Orthonormal motions of the springs that the pressed contacts leave, shape (n_springs, n); None if all are left."""
+        return null_space(self.contact_gradients) if len(self.contact_gradients) else None
+
+    @property
+    def contact_forces_unique(self) -> bool:
+        """Whether no other normal forces balance the robot: the gradients of the pressed gaps are independent.
+
+        Otherwise `contacts` has those of least norm.
+        """
+        left = 0 if self._free_motions is None else self._free_motions.shape[1] - self.model.n_springs
+        return -left == len(self.contact_gradients)
 
     @property
     def environment(self) -> Any:
@@ -81,8 +100,10 @@ class Equilibrium:
 
     @property
     def converged(self) -> bool:
-        """Whether the residual meets the tolerance."""
-        return self.residual <= self.tolerance
+        """Whether the residual meets the tolerance, and in contact pressed gaps are zero, and none is penetrated."""
+        largest = TOUCHING * self.model.reach
+        gaps = (contact.gap if contact.normal_force > 0.0 else min(contact.gap, 0.0) for contact in self.contacts)
+        return self.residual <= self.tolerance and all(abs(gap) <= largest for gap in gaps)
 
     @property
     def transform_tip_to_world(self) -> Any:
@@ -108,7 +129,7 @@ class Equilibrium:
     def link_limits(self) -> LinkLimits:
         """What each inflated link has left until its wall goes slack and until it wrinkles, with its axial force."""
         parts = {"q": self.q, "torques": self.spring_torques, "tensions": self.muscle_forces}
-        return link_limits(self.model, self.load.wrenches, self.load.gravity, **parts)
+        return link_limits(self.model, with_contacts(self.load.wrenches, self.contacts), self.load.gravity, **parts)
 
     @cached_property
     def muscle_lengths(self) -> FloatArray:
@@ -165,10 +186,14 @@ class Equilibrium:
 
     @cached_property
     def eigenvalues(self) -> FloatArray:
-        """Real parts of the eigenvalues of the tangent stiffness, ascending, shape (n_springs,) [N m/rad]."""
+        """Real parts of the eigenvalues of the tangent stiffness, ascending, shape (n_springs,) [N m/rad].
+
+        In contact those along the motions that the pressed contacts leave, which are as many fewer.
+        """
         solver = np.linalg.eigvalsh if self.conservative else np.linalg.eigvals
-        with one_blas_thread(len(self.tangent_stiffness)):
-            return read_only(np.sort(solver(self.tangent_stiffness).real))
+        left, tangent = self._free_motions, self.tangent_stiffness
+        with one_blas_thread(len(tangent)):
+            return read_only(np.sort(solver(tangent if left is None else left.T @ tangent @ left).real))
 
 
 def check_same_model(model: SoftModel, equilibrium: Any, name: str = "equilibrium") -> None:

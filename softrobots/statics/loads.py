@@ -13,6 +13,7 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
+from softrobots.environment.environment import Environment, check_environment
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel, check_model
 
@@ -62,7 +63,7 @@ class Load:
     """Wrench by frame name, shape (6,): force [N] then moment [N m], world axes, at the origin of the frame; read-only."""
     gravity: tuple[float, float, float] | None
     """Gravity, world axes [m/s^2]; None: weightless."""
-    environment: Any = None
+    environment: Environment | None = None
     """Obstacles that the robot may touch, a `softrobots.Environment`; None: free space."""
     terms: tuple[LoadTerm, ...] = field(init=False, repr=False)
     """The wrenches with the matrices of their derivatives."""
@@ -83,12 +84,19 @@ class Load:
 
     @classmethod
     def of(
-        cls, model: SoftModel, force: Any = None, *, wrench: Any = None, frame: str | None = None, gravity: Any = None
+        cls,
+        model: SoftModel,
+        force: Any = None,
+        *,
+        wrench: Any = None,
+        frame: str | None = None,
+        gravity: Any = None,
+        environment: Environment | None = None,
     ) -> Load:
         """Check a load, given as in `solve_equilibrium`, against a model; `wrench` is added to `force`.
 
         Raises:
-            ParameterError: If a shape differs or a number is not finite.
+            ParameterError: If a shape differs or a number is not finite, or an obstacle moves.
             NameNotFound: If a frame does not exist.
         """
         check_model(model)
@@ -104,10 +112,12 @@ class Load:
                 model.frame_id(name)
                 field = f"wrench[{name!r}]" if isinstance(wrench, Mapping) else "wrench"
                 total[name] = total.get(name, 0.0) + finite_array(field, value, (6,), "N, N m")
+        if environment is not None and check_environment(environment).moves:
+            raise ParameterError("environment", environment, "obstacles at rest: environment.at(parameter)")
         if gravity is None:
-            return cls(total, None)
+            return cls(total, None, environment)
         x, y, z = finite_array("gravity", gravity, (3,), "m/s^2").tolist()
-        return cls(total, (x, y, z))
+        return cls(total, (x, y, z), environment)
 
     def same_as(self, other: Load) -> bool:
         """Whether another load has the same wrenches, gravity and obstacles."""

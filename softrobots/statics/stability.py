@@ -24,7 +24,8 @@ from softrobots.core.checks import FloatArray, read_only
 from softrobots.model.coordinates import Point
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
-from softrobots.statics.elastic_state import ElasticState, positive
+from softrobots.statics.contact.certificate import softest_motion
+from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual, positive
 from softrobots.statics.loads import Load
 
 STABLE = "stable"
@@ -67,14 +68,18 @@ class Stability:
         return float(np.sqrt(-self.eigenvalues).real.max(initial=0.0))
 
 
-def is_stable(model: SoftModel, load: Load, state: ElasticState) -> bool:
+def is_stable(model: SoftModel, load: Load, state: ElasticState, tolerance: float = TOLERANCE) -> bool:
     """Whether a state in equilibrium is stable, see `stability`.
 
     Args:
         model: The robot.
         load: The load; for one with a potential the masses are not needed.
         state: The state; one whose tangent stiffness is not finite is not stable.
+        tolerance: Relative residual that counts as none; a contact force that loads the springs by less holds nothing.
     """
+    if state.touch is not None:
+        allowed = largest_residual(model, state.scale, tolerance)
+        return softest_motion(state.tangent, model.stiffness, state.touch, model.reach, allowed)[0] > POSITIVE
     if load.conservative:
         return is_positive(model, state.tangent)
     return stability(model, state.point, state.q, state.tangent).kind == STABLE
@@ -91,7 +96,9 @@ def is_positive(model: SoftModel, tangent: FloatArray, factors: Any = None, *, t
     return math.isfinite(np.vdot(tangent, tangent)) and positive(factors, tangent - times * model.springs.least_tangent)
 
 
-def stability(model: SoftModel, point: Point, q: FloatArray, tangent: FloatArray) -> Stability:
+def stability(
+    model: SoftModel, point: Point, q: FloatArray, tangent: FloatArray, motions: FloatArray | None = None
+) -> Stability:
     """Return the stability of an equilibrium.
 
     Args:
@@ -99,11 +106,13 @@ def stability(model: SoftModel, point: Point, q: FloatArray, tangent: FloatArray
         point: The robot at its actuator and elastic coordinates.
         q: Pinocchio's configuration there, shape (nq,).
         tangent: Tangent stiffness there, shape (n_springs, n_springs).
+        motions: Motions of the springs that contacts leave, shape (n_springs, n); all by default.
     """
     if not (point.valid and math.isfinite(np.vdot(tangent, tangent))):
         return Stability(UNKNOWN, read_only(np.zeros(0, dtype=np.complex128)))
     with one_blas_thread(len(tangent)):
-        return stability_of(tangent, mass_matrix(model, point, q), np.diag(model.stiffness))
+        matrices = tangent, mass_matrix(model, point, q), np.diag(model.stiffness)
+        return stability_of(*(one if motions is None else motions.T @ one @ motions for one in matrices))
 
 
 def mass_matrix(model: SoftModel, point: Point, q: FloatArray) -> FloatArray:

@@ -2,9 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
+import numpy as np
+
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.statics.contact.certificate import ActiveContacts
+from softrobots.statics.contact.touch import Touch
 
 PRESSED = "pressed"
 """Without friction, and a force."""
@@ -45,8 +50,45 @@ class Contact:
     """`PRESSED` or `TOUCHING` without friction, `STICKS` or `SLIPS` with it."""
     slip: FloatArray
     """Slip of the robot's point over the obstacle in this step, shape (3,) [m]; zero without friction."""
+    with_itself: bool = False
+    """Whether `obstacle` is a link of the robot itself."""
 
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
         for array in (self.point, self.obstacle_point, self.normal, self.force, self.slip):
             read_only(array)
+
+
+def contacts_of(touch: Touch, active: ActiveContacts) -> tuple[Contact, ...]:
+    """Return the touching candidates of a state as contacts without friction."""
+    gaps, pressed = touch.gaps, set(active.pressed.tolist())
+    points, opposite = gaps.points, gaps.obstacle_points
+    pairs = {place: touch.pair(place) for place in active.touching.tolist()}
+    return tuple(
+        Contact(
+            link=link,
+            obstacle=obstacle,
+            point=points[place].copy(),
+            obstacle_point=opposite[place].copy(),
+            normal=gaps.normals[place].copy(),
+            normal_force=float(touch.forces[place]),
+            force=touch.forces[place] * gaps.normals[place],
+            gap=float(gaps.values[place]),
+            strict=place in pressed,
+            status=PRESSED if place in pressed else TOUCHING,
+            slip=np.zeros(3),
+            with_itself=with_itself,
+        )
+        for place, (link, obstacle, with_itself) in pairs.items()
+    )
+
+
+def with_contacts(wrenches: Mapping[str, FloatArray], contacts: Iterable[Contact]) -> dict[str, FloatArray]:
+    """Return wrenches by frame, shape (6,) [N, N m], with the forces of contacts added; their moments are left out."""
+    total = dict(wrenches)
+    for contact in contacts:
+        force = np.concatenate([contact.force, np.zeros(3)])
+        total[contact.link] = total.get(contact.link, 0.0) + force
+        if contact.with_itself:
+            total[contact.obstacle] = total.get(contact.obstacle, 0.0) - force
+    return total

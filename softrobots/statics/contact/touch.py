@@ -1,0 +1,153 @@
+r"""Surfaces near the robot in its elastic coordinates: gaps, their gradients, and the load of the contact forces.
+
+With gaps :math:`g_i(y)` and normal forces :math:`\lambda_i`, the contacts load the elastic coordinates by
+:math:`G^T \lambda` with :math:`G = dg/dy`, and soften the tangent stiffness by :math:`\sum_i \lambda_i\, d^2 g_i/dy^2`
+(Wriggers, Computational Contact Mechanics, 2006, chapter 6).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+from softrobots.environment.gaps import Gaps, Surroundings
+from softrobots.model.coordinates import Point
+from softrobots.model.joint_loads import JointLoad
+from softrobots.model.soft_model import SoftModel
+
+TOUCHING = 1e-9
+"""Largest gap of surfaces that touch, and largest penetration of an equilibrium, relative to the reach."""
+
+_NEAR = 0.2  # gaps below this share of the reach are seen
+
+
+class Touch(NamedTuple):
+    """Candidates of contact near a robot, and the forces that are assumed on them."""
+
+    gaps: Gaps
+    """The candidates."""
+    rows: FloatArray
+    """Derivatives of the gaps by the elastic coordinates, shape (m, n_springs)."""
+    motor_rows: FloatArray
+    """Derivatives of the gaps by the actuators, shape (m, n_motors)."""
+    forces: FloatArray
+    """Normal forces, shape (m,) [N]."""
+    load: JointLoad
+    """Load of the forces on the joints, as dead forces."""
+    curvature: tuple[FloatArray, FloatArray]
+    """What their derivative has beside that of dead forces, by the joints; see `Gaps.curvature`."""
+    links: Sequence[str]
+    """Link of the robot of each capsule."""
+    names: Sequence[str]
+    """Names of the obstacles."""
+
+    @property
+    def penetration(self) -> float:
+        """Depth of the deepest penetration, zero without one [m]."""
+        return max(0.0, -float(self.gaps.values.min(initial=0.0)))
+
+    def pair(self, place: int) -> tuple[str, str, bool]:
+        """Link of a candidate; its obstacle, or other link; and whether that is a link."""
+        link, other = self.links[self.gaps.capsules[place]], int(self.gaps.obstacles[place])
+        within = other >= len(self.names)
+        return link, self.links[other - len(self.names)] if within else self.names[other], within
+
+    @property
+    def pushes(self) -> FloatArray:
+        """Load of the forces on the elastic coordinates, shape (n_springs,)."""
+        return np.asarray(self.forces @ self.rows)
+
+
+class ForceTable(NamedTuple):
+    """Normal forces by candidate, to carry them from one evaluation to the next."""
+
+    keys: Sequence[Any]
+    """Candidates, see `Gaps.keys`."""
+    forces: FloatArray
+    """Their normal forces [N]."""
+
+    def at(self, keys: Sequence[Any]) -> FloatArray:
+        """Forces on other candidates, shape (m,) [N]; zero on new ones."""
+        if keys == self.keys:
+            return self.forces
+        known = dict(zip(self.keys, self.forces.tolist(), strict=True))
+        return np.array([known.get(key, 0.0) for key in keys], dtype=np.float64)
+
+
+NO_FORCES = ForceTable((), np.zeros(0))
+"""No contact force yet."""
+
+
+class NearSurfaces:
+    """The surfaces around one robot; belongs to the thread that created it."""
+
+    def __init__(self, model: SoftModel, environment: Any) -> None:
+        """Take the robot and its environment."""
+        self._surroundings, self._margin = Surroundings(model, environment), _NEAR * model.reach
+        self._links, self._names = tuple(one.link for one in self._surroundings.capsules), environment.names
+
+    def at(self, q: FloatArray, point: Point, forces: ForceTable) -> Touch:
+        """Evaluate gaps and contact load at Pinocchio's configuration, shape (nq,), and the point of the coordinates there."""
+        gaps = self._surroundings.at(q, self._margin)
+        on_motors, on_springs = point.columns(gaps.jacobian)
+        each = forces.at(gaps.keys)
+        return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._links, self._names)
+
+
+def joined(applied: JointLoad, contact: JointLoad) -> JointLoad:
+    """Return a load with the load of contacts; contact forces have no potential."""
+    moments = applied.by_moment
+    if moments is not None:
+        moments = np.concatenate([moments, np.zeros_like(contact.angular)])
+    return applied._replace(
+        torque=applied.torque + contact.torque,
+        angular=np.concatenate([applied.angular, contact.angular]),
+        by_force=np.concatenate([applied.by_force, contact.by_force]),
+        by_moment=moments,
+        scale=applied.scale + contact.scale,
+    )
+
+
+def resting_forces(touch: Touch, out_of_balance: FloatArray, reach: float) -> FloatArray:
+    r"""Normal forces on touching candidates that balance best: :math:`\min \|r - G^T \lambda\|`, then of least norm.
+
+    Args:
+        touch: The candidates.
+        out_of_balance: Residual without contact forces, shape (n_springs,) [N m or N].
+        reach: Reach of the robot [m].
+
+    Returns:
+        Forces, zero or more, shape (m,) [N]. Where gradients depend on each other the forces are not unique.
+    """
+    forces = np.zeros(len(touch.rows))
+    near = np.flatnonzero(touch.gaps.values <= TOUCHING * reach)
+    if not len(near):
+        return forces
+    gradients = touch.rows[near].T
+    least = np.linalg.lstsq(gradients, out_of_balance, rcond=1e-10)[0]
+    if least.min() < 0.0:
+        least = _nonnegative(gradients, out_of_balance)
+    forces[near] = least
+    return forces
+
+
+def _nonnegative(gradients: FloatArray, load: FloatArray) -> FloatArray:
+    """Least squares with coefficients zero or more (Lawson and Hanson, 1974), of least norm among the best."""
+    from scipy.optimize import nnls
+
+    sizes = np.maximum(np.linalg.norm(gradients, axis=0), 1e-300)
+    forces = np.asarray(nnls(gradients / sizes, load, maxiter=100 * len(sizes))[0]) / sizes
+    return forces
+
+
+def deepest_penetration(touch: Touch) -> str:
+    """Return what penetrates most, in words."""
+    place = int(touch.gaps.values.argmin())
+    link, other, _ = touch.pair(place)
+    words = f"{link!r} is {-touch.gaps.values[place]:.3g} m inside of {other!r}"
+    if not touch.rows[place].any():
+        words += ", wherever the springs are: move the motors or the obstacle"
+    return words
