@@ -18,9 +18,11 @@ from eigenpy import LDLT
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
 from softrobots.model.friction_coordinates import SAME_FRICTION, gripped
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
+from softrobots.statics.contact.solver import settle
 from softrobots.statics.elastic_state import (
     TOLERANCE,
     ElasticProblem,
@@ -66,12 +68,18 @@ def solve_springs(
     Returns:
         The last state, whether or not it meets the tolerance (see `largest_residual`); the evaluations spent; and whether that
         state is stable (see `softrobots.statics.stability`).
+
+    Raises:
+        ParameterError: If the load has an environment and a moment, or the method is not "newton" there.
     """
     most = MOST_ITERATIONS[method] if max_iterations is None else max_iterations
+    solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
     if load.environment is not None:
-        from softrobots.statics.contact.solver import settle as solve
-    else:
-        solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
+        if method != "newton":
+            raise ParameterError("method", method, "'newton' in contact with an environment")
+        if not load.conservative:
+            raise ParameterError("wrench", load.wrenches, "forces only in contact with an environment: moments have no energy")
+        solve = settle
     with one_blas_thread(model.n_springs):
         state, spent, stable = solve(ElasticProblem(model, q_motors, load, tolerance), start, most)
         while model.structure.guided:  # the friction of guides follows the tensions

@@ -70,8 +70,6 @@ def solve_equilibrium(
     model = untouched(check_model(model))
     motors = model.checked_motors(q_motors)
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity, environment=environment)
-    if environment is not None and method != "newton":
-        raise ParameterError("method", method, "'newton' in contact with an environment")
     relaxed = model.rest
     if previous is not None:
         check_same_model(model, previous, "previous")

@@ -2,8 +2,8 @@ r"""Which contacts of an equilibrium are pressed, and whether it is stable: seco
 
 With the pressed gradients `G` (forces clear of rounding) an equilibrium is a strict minimum of the energy if the Hessian of the
 Lagrangian is positive on all motions `p` with :math:`G p = 0`, and :math:`a_i p \ge 0` for the gradients :math:`a_i` of gaps
-that touch without a force (Nocedal and Wright, Numerical Optimization, 2006, theorem 12.6). Without such touches that is a positive
-definite matrix on a null space; with them a matrix that is positive on a cone.
+that touch without a force (Nocedal and Wright, Numerical Optimization, 2006, theorem 12.6). Without such touches that is a
+positive definite matrix on a null space; with them a matrix that is positive on a cone.
 """
 
 from __future__ import annotations

@@ -39,10 +39,8 @@ class Touch(NamedTuple):
     """Load of the forces on the joints, as dead forces."""
     curvature: tuple[FloatArray, FloatArray]
     """What their derivative has beside that of dead forces, by the joints; see `Gaps.curvature`."""
-    links: Sequence[str]
-    """Link of the robot of each capsule."""
-    names: Sequence[str]
-    """Names of the obstacles."""
+    surroundings: Surroundings
+    """The robot among the obstacles."""
 
     @property
     def penetration(self) -> float:
@@ -51,9 +49,8 @@ class Touch(NamedTuple):
 
     def pair(self, place: int) -> tuple[str, str, bool]:
         """Link of a candidate; its obstacle, or other link; and whether that is a link."""
-        link, other = self.links[self.gaps.capsules[place]], int(self.gaps.obstacles[place])
-        within = other >= len(self.names)
-        return link, self.links[other - len(self.names)] if within else self.names[other], within
+        links, names, other = self.surroundings.links, self.surroundings.names, int(self.gaps.obstacles[place])
+        return links[self.gaps.capsules[place]], names[other], other >= len(names) - len(links)
 
     @property
     def pushes(self) -> FloatArray:
@@ -87,14 +84,13 @@ class NearSurfaces:
     def __init__(self, model: SoftModel, environment: Any) -> None:
         """Take the robot and its environment."""
         self._surroundings, self._margin = Surroundings(model, environment), _NEAR * model.reach
-        self._links, self._names = tuple(one.link for one in self._surroundings.capsules), environment.names
 
     def at(self, q: FloatArray, point: Point, forces: ForceTable) -> Touch:
         """Evaluate gaps and contact load at Pinocchio's configuration, shape (nq,), and the point of the coordinates there."""
         gaps = self._surroundings.at(q, self._margin)
         on_motors, on_springs = point.columns(gaps.jacobian)
         each = forces.at(gaps.keys)
-        return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._links, self._names)
+        return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._surroundings)
 
 
 def joined(applied: JointLoad, contact: JointLoad) -> JointLoad:
@@ -135,12 +131,12 @@ def resting_forces(touch: Touch, out_of_balance: FloatArray, reach: float) -> Fl
 
 
 def _nonnegative(gradients: FloatArray, load: FloatArray) -> FloatArray:
-    """Least squares with coefficients zero or more (Lawson and Hanson, 1974), of least norm among the best."""
+    """Least squares with coefficients zero or more (Lawson and Hanson, 1974)."""
     from scipy.optimize import nnls
 
     sizes = np.maximum(np.linalg.norm(gradients, axis=0), 1e-300)
-    forces = np.asarray(nnls(gradients / sizes, load, maxiter=100 * len(sizes))[0]) / sizes
-    return forces
+    forces: FloatArray = nnls(gradients / sizes, load, maxiter=100 * len(sizes))[0]
+    return np.asarray(forces / sizes)
 
 
 def deepest_penetration(touch: Touch) -> str:
