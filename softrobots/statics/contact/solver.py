@@ -19,15 +19,15 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import softest_motion
 from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step
-from softrobots.statics.contact.touch import ForceTable
+from softrobots.statics.contact.touch import ForceTable, Touch
 from softrobots.statics.elastic_state import ElasticProblem, ElasticState, largest_residual, norm
+from softrobots.statics.stability import is_stable
 
 _LARGEST_STEP = 0.5  # [rad], norm of one step; the linear model of a revolute chain is inaccurate beyond
 _ARMIJO = 1e-4  # share of the predicted decrease that a step must reach
 _SHORTEST = 1e-10  # share of a step below which it is not halved again
 _EXACT = 1e-12  # gap of a pressed contact that is zero, relative to the reach
 _ESCAPE = 0.1  # [rad], step out of an unstable equilibrium
-_PATIENCE = 4  # steps of Newton that may raise the energy while the error does not halve
 
 
 def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[ElasticState, int, bool]:
@@ -44,22 +44,16 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
     state, spent, price = problem.state(start), 1, 0.0
     factors = LDLT(len(start))
     while spent < most and state.touch is not None:
-        if error_of(problem, state) <= 1.0:
-            motion = _way_out(problem, state)
-            if motion is None:
-                return state, spent, _softest(problem, state)[0] > POSITIVE
-            step = Step(motion, state.touch.forces, False)
-        else:
-            found = _step(problem, state, factors)
-            if found is None:
-                break
-            step = found
-        trial, used, price = _search(problem, state, step, price, most - spent)
+        seek = _step if error_of(problem, state) > 1.0 else _way_out
+        step = seek(problem, state, state.touch, factors)
+        if step is None:
+            break
+        trial, used, price = _search(problem, state, state.touch, step, price, most - spent)
         spent += used
         if trial is None:
             break
         state = trial
-    return state, spent, state.touch is not None and _softest(problem, state)[0] > POSITIVE
+    return state, spent, is_stable(problem.model, problem.load, state, problem.tolerance)
 
 
 def error_of(problem: ElasticProblem, state: ElasticState) -> float:
@@ -72,18 +66,9 @@ def error_of(problem: ElasticProblem, state: ElasticState) -> float:
     return max(state.error / allowed, max(touch.penetration, open_gap) / (_EXACT * problem.model.reach))
 
 
-def _softest(problem: ElasticProblem, state: ElasticState) -> tuple[float, FloatArray]:
-    """Least curvature relative to the springs along the motions that the contacts leave, and the motion."""
-    touch, model = state.touch, problem.model
-    assert touch is not None
-    allowed = largest_residual(model, state.scale, problem.tolerance)
-    return softest_motion(state.tangent, model.stiffness, touch, model.reach, allowed)
-
-
-def _step(problem: ElasticProblem, state: ElasticState, factors: LDLT) -> Step | None:
+def _step(problem: ElasticProblem, state: ElasticState, touch: Touch, factors: LDLT) -> Step | None:
     """Step of the quadratic programme, over the gaps that it can close."""
-    touch, stiffness = state.touch, problem.model.stiffness
-    assert touch is not None
+    stiffness = problem.model.stiffness
     load = state.residual + touch.pushes
     values = touch.gaps.values
     within = np.flatnonzero(values <= _LARGEST_STEP * np.linalg.norm(touch.rows, axis=1))
@@ -96,35 +81,33 @@ def _step(problem: ElasticProblem, state: ElasticState, factors: LDLT) -> Step |
     return found._replace(forces=forces)
 
 
-def _way_out(problem: ElasticProblem, state: ElasticState) -> FloatArray | None:
+def _way_out(problem: ElasticProblem, state: ElasticState, touch: Touch, factors: LDLT) -> Step | None:
     """Step out of an unstable equilibrium along its softest motion that the contacts leave; None at any other.
 
     Of two signs that are free the one with the positive largest component is taken, so that results repeat.
     """
-    curvature, motion = _softest(problem, state)
-    touch = state.touch
-    if curvature > -POSITIVE or touch is None:
+    model, allowed = problem.model, largest_residual(problem.model, state.scale, problem.tolerance)
+    curvature, motion = softest_motion(state.tangent, model.stiffness, touch, model.reach, allowed)
+    if curvature > -POSITIVE or not math.isfinite(curvature):
         return None
     motion = motion * (_ESCAPE / norm(motion))
     if motion[np.argmax(np.abs(motion))] < 0.0:
         motion = -motion
     for wanted in (motion, -motion):
-        step = nearest_step(wanted, touch.gaps.values, touch.rows, problem.model.stiffness)
+        step = nearest_step(wanted, touch.gaps.values, touch.rows, model.stiffness)
         if step is not None and float(step @ state.tangent @ step) < 0.0 and norm(step) > 0.1 * norm(wanted):
-            return step
+            return Step(step, touch.forces, False)
     return None
 
 
 def _search(
-    problem: ElasticProblem, state: ElasticState, step: Step, price: float, most: int
+    problem: ElasticProblem, state: ElasticState, touch: Touch, step: Step, price: float, most: int
 ) -> tuple[ElasticState | None, int, float]:
     """Go along a step as far as energy and penetration allow.
 
     Returns:
         The next state, or None where nothing is gained any more; the evaluations spent; and the price of penetration [N].
     """
-    touch = state.touch
-    assert touch is not None
     whole = step.step
     scale = min(1.0, _LARGEST_STEP / max(norm(whole), 1e-300))
     deep = touch.penetration
