@@ -12,7 +12,16 @@ import numpy as np
 from softrobots.core.errors import DescriptionError
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.environment.environment import Environment
 from softrobots.export.meshes import MeshFiles, mujoco_reads
+from softrobots.export.mjcf_contact import (
+    SOFTNESS,
+    capsule_bits,
+    solid_size,
+    where,
+    write_contact_defaults,
+    write_obstacles,
+)
 from softrobots.export.mjcf_tendons import Sites, place_sites, write_drives, write_tendons
 from softrobots.export.prepared import PreparedRobot, checked_gravity, neighbours, prepare, weld_groups
 from softrobots.export.servos import ANGLE_ERROR, LENGTH_ERROR, Motor
@@ -34,6 +43,8 @@ def to_mjcf(
     damping: str | float = "file",
     gravity: Any = None,
     limits: bool = True,
+    environment: Environment | None = None,
+    friction: float = 0.0,
 ) -> str:
     """Write a robot as MJCF that MuJoCo 3 and 4 read.
 
@@ -48,6 +59,9 @@ def to_mjcf(
     McKibben muscles are springs of tendons (the latter in MuJoCo 4 only, whose springs have polynomials). The keyframe `home`
     holds the relaxed springs and `q_motors` as `ctrl`.
 
+    In an environment, obstacles are geoms of the world with their names, and the capsules of the robot touch them, in place of
+    the collision shapes of the URDF (`softrobots.export.contact_shapes`). `SOFTNESS` says how stiff.
+
     Args:
         model: The robot.
         q_motors: Motor joints, then inputs of actuators, shape (n_motors,) [rad, m, N or Pa]; relaxed by default.
@@ -56,6 +70,8 @@ def to_mjcf(
             without swinging (`softrobots.export.damping`).
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
+        environment: Obstacles around the robot, which stand still.
+        friction: Coefficient of friction between the robot and them.
 
     Returns:
         MJCF text.
@@ -63,12 +79,14 @@ def to_mjcf(
     Raises:
         ParameterError: If an argument does not fit, or the robot has sections of constant strain, springs that are not linear,
             or actuators that MuJoCo does not have: driven McKibben muscles; welded, given lengths and tensions along winding
-            routes.
+            routes. If obstacles move, or friction is given without any.
         DescriptionError: If the robot has moving links without mass or moments of inertia, a link with impossible
             moments, a link `world` that is not its root, or more joints than Pinocchio supports.
     """
     field = checked_gravity(gravity)
-    robot = prepare(model, q_motors, actuators=actuators, damping=damping, apart=SPRINGY)
+    robot = prepare(
+        model, q_motors, actuators=actuators, damping=damping, apart=SPRINGY, environment=environment, friction=friction
+    )
     _refuse(robot.tree)
     tendons = tendons_of(model, robot, welded=actuators == "welded")
     root = ElementTree.Element("mujoco", {"model": robot.tree.name or "robot"})
@@ -77,13 +95,18 @@ def to_mjcf(
     option = ElementTree.SubElement(root, "option", {"gravity": number_text(field)})
     if robot.motors or tendons:
         option.set("integrator", "implicitfast")  # which treats the damping of actuators and tendons implicitly, too
+    if robot.contact is not None:
+        write_contact_defaults(root, option, robot.contact.friction)
     assets = ElementTree.SubElement(root, "asset")
     sites = place_sites(tendons)
     bodies = _Bodies(robot, limits, damping == "critical", assets, sites)
-    bodies.write(ElementTree.SubElement(root, "worldbody"))
+    world = ElementTree.SubElement(root, "worldbody")
+    bodies.write(world)
+    if robot.contact is not None:
+        write_obstacles(world, assets, robot.contact)
     if not len(assets):
         root.remove(assets)
-    pairs = neighbours(robot.tree)
+    pairs = neighbours(robot.tree) if robot.contact is None or robot.contact.self_contact else ()
     if pairs:
         contact = ElementTree.SubElement(root, "contact")
         for first, second in pairs:
@@ -122,7 +145,7 @@ class _Bodies:
             self._body(world, tree.body(tree.root), Placement(), None)
 
     def _body(self, parent: ElementTree.Element, body: Body, placement: Placement, joint: Joint | None) -> None:
-        element = ElementTree.SubElement(parent, "body", {"name": body.name, **_where(placement)})
+        element = ElementTree.SubElement(parent, "body", {"name": body.name, **where(placement)})
         if joint is not None and joint.movable:
             self._joint(element, joint)
         if body.mass > 0.0:
@@ -131,12 +154,13 @@ class _Bodies:
         self._inside(element, body)
 
     def _inside(self, element: ElementTree.Element, body: Body) -> None:
+        contact = capsule_bits(self._robot.contact) if self._robot.contact is not None else {}
         drawn = self.meshes.split(body.visuals, mujoco_reads)
         touching = self.meshes.split(body.collisions, mujoco_reads)
         for shape, file in drawn:
             self._geom(element, shape, file, {"group": _DRAWN, "contype": "0", "conaffinity": "0"})
         for shape, file in touching:  # visible if no visual could be written
-            self._geom(element, shape, file, {"group": _HIDDEN if drawn or not body.visuals else _DRAWN})
+            self._geom(element, shape, file, {"group": _HIDDEN if drawn or not body.visuals else _DRAWN, **contact})
         if body.name == self._robot.tip:
             ElementTree.SubElement(element, "site", {"name": body.name})
         for name, place in self._sites.get(body.name, ()):
@@ -165,14 +189,9 @@ class _Bodies:
         ElementTree.SubElement(element, "joint", attributes)
 
     def _geom(self, element: ElementTree.Element, shape: Shape, file: Path | None, options: dict[str, str]) -> None:
-        attributes = {"type": shape.kind}
-        if file is not None:
-            attributes["mesh"] = self._mesh(file, shape.size)
-        else:
-            halves = (0.5, 0.5, 0.5) if shape.kind == "box" else (1.0, 0.5)  # MuJoCo takes half lengths
-            attributes["size"] = number_text(half * size for half, size in zip(halves, shape.size, strict=False))
-        rgba = shape.rgba or _GREY
-        ElementTree.SubElement(element, "geom", {**attributes, **_where(shape.placement), "rgba": number_text(rgba), **options})
+        measure = solid_size(shape) if file is None else {"mesh": self._mesh(file, shape.size)}
+        attributes = {"type": shape.kind, **measure, **where(shape.placement), "rgba": number_text(shape.rgba or _GREY)}
+        ElementTree.SubElement(element, "geom", attributes | options)
 
     def _mesh(self, file: Path, scale: tuple[float, ...]) -> str:
         key = (file, scale)
@@ -218,13 +237,6 @@ def _inertia(body: Body) -> dict[str, str]:
     return {"diaginertia": number_text(principal), "quat": number_text(turned.quaternion)}
 
 
-def _where(placement: Placement) -> dict[str, str]:
-    attributes = {"pos": number_text(placement.position)} if np.any(placement.position) else {}
-    if np.any(placement.rotation != np.eye(3)):
-        attributes["quat"] = number_text(placement.quaternion)
-    return attributes
-
-
 def _write_motors(element: ElementTree.Element, motors: Sequence[Motor]) -> None:
     for motor in motors:
         gain, damping, force = motor.servo
@@ -247,6 +259,8 @@ def _head(robot: PreparedRobot, driven: Sequence[ActuatorTag], meshes: MeshFiles
         lines.append(f"Actuators of given length give all their force at an error of {LENGTH_ERROR} of their length at rest.")
     if driven:
         lines.append("The ctrl of an actuator is its length, that of its motor [m], its tension [N] or pressure [Pa].")
+    if robot.contact is not None:
+        lines += [robot.contact.remark, SOFTNESS]
     if not limits:
         lines.append("The springs have no limits here.")
     return [*lines, *meshes.remark("neither OBJ nor binary STL")]

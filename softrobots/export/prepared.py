@@ -17,6 +17,7 @@ from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import SpringTag
+from softrobots.export.contact_shapes import ContactShapes, contact_shapes, with_capsules
 from softrobots.export.damping import checked_damping, damped, lowest_frequency, mass_matrix, rule_text
 from softrobots.export.held import ACTUATORS, check_linear, hold, weld
 from softrobots.export.servos import Motor, motors_of
@@ -47,6 +48,8 @@ class PreparedRobot:
     """Remarks on motors and actuators for the head of the file."""
     damping_rule: str
     """Where the damping of the springs comes from, in words, for the head of the file."""
+    contact: ContactShapes | None
+    """Surroundings, if any; then the collision shapes of the bodies are their capsules."""
 
 
 def prepare(
@@ -56,8 +59,10 @@ def prepare(
     actuators: str = "driven",
     damping: str | float = "file",
     apart: Sequence[str] = (),
+    environment: Any = None,
+    friction: Any = 0.0,
 ) -> PreparedRobot:
-    """Fix or drive the motors, put held tensions into the springs, choose damping and servos.
+    """Fix or drive the motors, put held tensions into the springs, choose damping and servos, and what touches.
 
     Args:
         model: The robot.
@@ -65,15 +70,19 @@ def prepare(
         actuators: "driven" or "welded".
         damping: "file", "critical" or a damping time [s], see `softrobots.export.damping`.
         apart: Kinds of actuators that are no part of the springs if they are welded.
+        environment: Obstacles around the robot, see `contact_shapes`.
+        friction: Coefficient of friction.
 
     Raises:
         ParameterError: If `check_linear` refuses the model; a choice is unknown; `q_motors` does not fit the robot or, driven,
-            is beyond the limits of the actuators; or actuators are to be welded that are no joint springs (`hold`).
+            is beyond the limits of the actuators; actuators are to be welded that are no joint springs (`hold`); or
+            `contact_shapes` refuses the surroundings.
         DescriptionError: If the robot has moving bodies without mass, or more joints than Pinocchio supports.
     """
     checked = check_linear(model)
     choice("actuators", actuators, ACTUATORS)
     rule = checked_damping(damping)
+    contact = contact_shapes(environment, friction)
     values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
     structure, tree = checked.structure, read_rigid_tree(checked.urdf)
     positions = dict(zip(structure.motor_joints, values.tolist(), strict=False))
@@ -86,6 +95,8 @@ def prepare(
         springs = {name: SpringTag(*pair) for name, pair in checked.spring_table.items()}
     tree = weld(tree, fixed)
     _refuse_massless(tree)
+    if contact is not None:
+        tree = with_capsules(tree, checked.structure.tags.capsules)
     swings = rule == "critical" and bool(springs)
     mass = mass_matrix(checked, values) if swings or (positions and not welded) else np.zeros((0, 0))
     frequency = lowest_frequency(checked, mass) if swings else None
@@ -100,6 +111,7 @@ def prepare(
         frequency=frequency,
         remarks=_remarks(checked, values, welded),
         damping_rule=rule_text(rule, frequency),
+        contact=contact,
     )
 
 

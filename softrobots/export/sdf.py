@@ -13,15 +13,14 @@ import numpy as np
 from softrobots.core.checks import LARGEST
 from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
+from softrobots.environment.environment import Environment
 from softrobots.export.meshes import MeshFiles, drake_collides, drawn_anywhere
 from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
+from softrobots.export.sdf_contact import HARDNESS, write_hardness, write_obstacles
+from softrobots.export.sdf_parts import DRAKE, WORLD, write_colour, write_geometry, write_number, write_pose
 from softrobots.export.xml_text import document
 from softrobots.model.soft_model import SoftModel
 
-DRAKE = "http://drake.mit.edu"
-"""XML namespace of Drake's tags."""
-
-_WORLD = "world"
 _WORLD_SHAPES = "world_shapes"  # the world of SDF cannot have shapes
 _STAND_IN = (1e-3, 1e-6)  # [kg], [kg m^2], without effect: for massless bodies fixed to the world
 
@@ -33,6 +32,8 @@ def to_sdf(
     actuators: str = "driven",
     damping: str | float = "file",
     limits: bool = True,
+    environment: Environment | None = None,
+    friction: float = 0.0,
 ) -> str:
     """Write a robot as a model of SDF 1.9.
 
@@ -48,6 +49,10 @@ def to_sdf(
     Collisions of neighbours along the chain (`prepared.neighbours`) are excluded for Drake. Gazebo has no such exclusions, but
     ignores collisions within a model unless `self_collide` is set. In SDF, gravity belongs to the world, not to the model.
 
+    In an environment, the file is a world of two models, the robot and its surroundings, a link with the name of each obstacle.
+    The capsules of the robot touch them, in place of the collision shapes of the URDF (`softrobots.export.contact_shapes`);
+    `softrobots.export.sdf_contact` says how stiff.
+
     Args:
         model: The robot.
         q_motors: Motor joints, then tensions or pressures, shape (n_motors,) [rad, m, N or Pa]; relaxed by default. For driven
@@ -56,31 +61,40 @@ def to_sdf(
         damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
             without swinging (`softrobots.export.damping`).
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
+        environment: Obstacles around the robot, which stand still.
+        friction: Coefficient of friction between the robot and them.
 
     Returns:
         SDF text.
 
     Raises:
         ParameterError: If an argument does not fit, muscles are to be driven, or the robot has sections of constant strain,
-            springs that are not linear, or muscles that are no joint springs when they are welded.
+            springs that are not linear, or muscles that are no joint springs when they are welded. If obstacles move or are
+            meshes that Drake cannot read, or friction is given without any.
         DescriptionError: If the robot has moving links without mass, a link and a joint of one name or of a name that SDF
             reserves, or more joints than Pinocchio supports.
     """
-    robot = prepare(model, q_motors, actuators=actuators, damping=damping)
+    robot = prepare(model, q_motors, actuators=actuators, damping=damping, environment=environment, friction=friction)
     if model.muscles and actuators == "driven":
         raise ParameterError("actuators", actuators, '"welded" for a robot with muscles or tendons, which SDF does not have')
     tree = robot.tree
     names = [body.name for body in tree.bodies] + [joint.name for joint in tree.joints]
-    reserved = [body.name for body in tree.bodies[1:] if body.name == _WORLD]
-    reserved += [name for name in names if "::" in name or (name.startswith("__") and name.endswith("__"))]
+    obstacles = robot.contact.obstacles if robot.contact is not None else ()
+    reserved = [name for name in (*(body.name for body in tree.bodies[1:]), *obstacles) if name == WORLD]
+    reserved += [name for name in (*names, *obstacles) if "::" in name or (name.startswith("__") and name.endswith("__"))]
     if reserved:
-        raise DescriptionError(f"{tree.name} has links or joints named {', '.join(reserved)}; SDF reserves these names")
+        message = f"{tree.name} has links, joints or obstacles named {', '.join(reserved)}; SDF reserves these names"
+        raise DescriptionError(message)
     twice = sorted({name for name in names if names.count(name) > 1})
     if twice:
         raise DescriptionError(f"{tree.name} has a link and a joint named {', '.join(twice)}; SDF requires different names")
     ElementTree.register_namespace("drake", DRAKE)
     root = ElementTree.Element("sdf", {"version": "1.9"})
-    writer = _Model(ElementTree.SubElement(root, "model", {"name": tree.name or "robot"}), robot, limits)
+    name, parent = tree.name or "robot", root
+    if robot.contact is not None:
+        parent = ElementTree.SubElement(root, "world", {"name": f"{name}_with_surroundings"})
+        write_obstacles(parent, robot.contact)
+    writer = _Model(ElementTree.SubElement(parent, "model", {"name": name}), robot, limits)
     writer.write()
     return document(root, _head(robot, writer.meshes, limits))
 
@@ -106,13 +120,13 @@ class _Model:
         places: dict[str, tuple[Placement, str]] = {joint.child: (joint.placement, joint.parent) for joint in tree.joints}
         links: dict[str, ElementTree.Element] = {}
         for body in tree.bodies:
-            placement, parent = places.get(body.name, (Placement(), _WORLD))
-            if body.name == _WORLD:
+            placement, parent = places.get(body.name, (Placement(), WORLD))
+            if body.name == WORLD:
                 if body.visuals or body.collisions:
-                    links[_WORLD] = self._link(replace(body, name=self._world_shapes), placement, parent)
+                    links[WORLD] = self._link(replace(body, name=self._world_shapes), placement, parent)
             elif body.name in self._anchor:
                 attributes = {"name": body.name, "attached_to": self._anchor[body.name]}
-                _write_pose(ElementTree.SubElement(self._element, "frame", attributes), placement, parent)
+                write_pose(ElementTree.SubElement(self._element, "frame", attributes), placement, parent)
             else:
                 links[body.name] = self._link(body, placement, parent)
         for body in tree.bodies:
@@ -120,9 +134,9 @@ class _Model:
             if carrier in links:
                 self._shapes(links[carrier], body, body.visuals, "visual", drawn_anywhere)
                 self._shapes(links[carrier], body, body.collisions, "collision", drake_collides)
-        if tree.root != _WORLD or _WORLD in links:
-            child = tree.root if tree.root != _WORLD else self._world_shapes
-            self._joint(self._free_name(f"{child}_to_world"), "fixed", _WORLD, child)
+        if tree.root != WORLD or WORLD in links:
+            child = tree.root if tree.root != WORLD else self._world_shapes
+            self._joint(self._free_name(f"{child}_to_world"), "fixed", WORLD, child)
         for joint in tree.joints:
             if joint.movable:
                 self._moving(joint)
@@ -132,16 +146,16 @@ class _Model:
 
     def _link(self, body: Body, placement: Placement, parent: str) -> ElementTree.Element:
         link = ElementTree.SubElement(self._element, "link", {"name": body.name})
-        _write_pose(link, placement, parent)
+        write_pose(link, placement, parent)
         mass, moments = body.mass, body.inertia_in_body
         if mass <= 0.0:
             mass, moments = _STAND_IN[0], _STAND_IN[1] * np.eye(3)
         inertial = ElementTree.SubElement(link, "inertial")
-        _write_pose(inertial, Placement(body.centre.position))
-        _write_number(inertial, "mass", mass)
+        write_pose(inertial, Placement(body.centre.position))
+        write_number(inertial, "mass", mass)
         entries = ElementTree.SubElement(inertial, "inertia")
         for first, second in ("xx", "xy", "xz", "yy", "yz", "zz"):
-            _write_number(entries, f"i{first}{second}", moments["xyz".index(first), "xyz".index(second)])
+            write_number(entries, f"i{first}{second}", moments["xyz".index(first), "xyz".index(second)])
         return link
 
     def _shapes(
@@ -150,20 +164,12 @@ class _Model:
         for shape, file in self.meshes.split(shapes, readable):
             number = len(link.findall(kind)) + 1
             element = ElementTree.SubElement(link, kind, {"name": f"{kind}_{number}"})
-            _write_pose(element, shape.placement, body.name if body.name in self._anchor else "")
-            geometry = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
-            if file is not None:
-                ElementTree.SubElement(geometry, "uri").text = file.as_uri()
-                ElementTree.SubElement(geometry, "scale").text = number_text(shape.size)
-            elif shape.kind == "box":
-                ElementTree.SubElement(geometry, "size").text = number_text(shape.size)
-            else:
-                for name, value in zip(("radius", "length"), shape.size, strict=False):
-                    _write_number(geometry, name, value)
+            write_pose(element, shape.placement, body.name if body.name in self._anchor else "")
+            write_geometry(element, shape, file)
             if kind == "visual" and shape.rgba is not None:
-                material = ElementTree.SubElement(element, "material")
-                for name in ("ambient", "diffuse"):
-                    ElementTree.SubElement(material, name).text = number_text(shape.rgba)
+                write_colour(element, shape.rgba)
+            if kind == "collision" and self._robot.contact is not None:
+                write_hardness(element, self._robot.contact.friction)
 
     def _joint(self, name: str, kind: str, parent: str, child: str) -> ElementTree.Element:
         element = ElementTree.SubElement(self._element, "joint", {"name": name, "type": kind})
@@ -179,32 +185,34 @@ class _Model:
         axis = ElementTree.SubElement(element, "axis")
         ElementTree.SubElement(axis, "xyz").text = number_text(joint.axis)
         dynamics = ElementTree.SubElement(axis, "dynamics")
-        _write_number(dynamics, "damping", joint.damping)
+        write_number(dynamics, "damping", joint.damping)
         if joint.friction > 0.0 and spring is None:
-            _write_number(dynamics, "friction", joint.friction)
+            write_number(dynamics, "friction", joint.friction)
         if joint.rotor_inertia > 0.0 and spring is None:
-            _write_number(element, f"{{{DRAKE}}}rotor_inertia", joint.rotor_inertia)
+            write_number(element, f"{{{DRAKE}}}rotor_inertia", joint.rotor_inertia)
         if spring is not None:
-            _write_number(dynamics, "spring_stiffness", spring.stiffness)
-            _write_number(dynamics, "spring_reference", spring.rest)
+            write_number(dynamics, "spring_stiffness", spring.stiffness)
+            write_number(dynamics, "spring_reference", spring.rest)
         limit = ElementTree.SubElement(axis, "limit")
         if bounded:
-            _write_number(limit, "lower", joint.limits[0])
-            _write_number(limit, "upper", joint.limits[1])
+            write_number(limit, "lower", joint.limits[0])
+            write_number(limit, "upper", joint.limits[1])
         for name, value in (("effort", joint.effort if spring is None else 0.0), ("velocity", joint.velocity)):
             if value < LARGEST:
-                _write_number(limit, name, value)
+                write_number(limit, name, value)
 
     def _filters(self) -> None:
-        """Exclude collisions of neighbours in Drake; a pair is a group that ignores itself."""
-        pairs = (
-            (self._anchor.get(first, first), self._anchor.get(second, second)) for first, second in neighbours(self._robot.tree)
-        )
-        for number, pair in enumerate(dict.fromkeys(pairs), 1):
-            name = f"neighbours_{number}"
+        """Exclude collisions in Drake, of neighbours or, in surroundings, of all; a group ignores itself."""
+        tree, contact = self._robot.tree, self._robot.contact
+        groups: Sequence[tuple[str, ...]] = neighbours(tree)
+        if contact is not None and not contact.self_contact:
+            groups = [tuple(body.name for body in tree.bodies if body.collisions)]
+        carriers = [tuple(dict.fromkeys(self._anchor.get(member, member) for member in group)) for group in groups]
+        for number, members in enumerate(dict.fromkeys(carriers), 1):
+            name = f"no_collision_{number}"
             group = ElementTree.SubElement(self._element, f"{{{DRAKE}}}collision_filter_group", {"name": name})
-            for member in pair:
-                ElementTree.SubElement(group, f"{{{DRAKE}}}member").text = member if member != _WORLD else self._world_shapes
+            for member in members:
+                ElementTree.SubElement(group, f"{{{DRAKE}}}member").text = member if member != WORLD else self._world_shapes
             ElementTree.SubElement(group, f"{{{DRAKE}}}ignored_collision_filter_group").text = name
 
 
@@ -219,23 +227,11 @@ def _anchors(tree: RigidTree) -> dict[str, str]:
     return {body.name: heavy[group[body.name]] for body in tree.bodies if body.mass <= 0.0 and group[body.name] != static}
 
 
-def _write_pose(element: ElementTree.Element, placement: Placement, relative_to: str = "") -> None:
-    relative_to = "" if relative_to == _WORLD else relative_to
-    if not relative_to and not np.any(placement.position) and np.array_equal(placement.rotation, np.eye(3)):
-        return
-    w, x, y, z = placement.quaternion
-    attributes = {"relative_to": relative_to} if relative_to else {}
-    pose = ElementTree.SubElement(element, "pose", attributes | {"rotation_format": "quat_xyzw"})
-    pose.text = number_text([*placement.position, x, y, z, w])
-
-
-def _write_number(element: ElementTree.Element, name: str, value: float) -> None:
-    ElementTree.SubElement(element, name).text = repr(float(value))
-
-
 def _head(robot: PreparedRobot, meshes: MeshFiles, limits: bool) -> list[str]:
     lines = [f"{robot.tree.name}, SDF 1.9 for Drake and Gazebo; written by softrobots from its URDF. SI units and radians."]
     lines += [*robot.remarks, robot.damping_rule, "Gravity is not in this file: it is the world's."]
+    if robot.contact is not None:
+        lines += [robot.contact.remark, HARDNESS]
     if not limits:
         lines.append("The springs have no limits here.")
     return [*lines, *meshes.remark("to collide and not OBJ, glTF or VTK, which alone Drake reads")]

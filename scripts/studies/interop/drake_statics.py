@@ -10,6 +10,7 @@ import numpy as np
 from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NotConverged
+from softrobots.export.sdf_contact import SURROUNDINGS
 from studies.interop.newton import balance_point
 from studies.interop.outcomes import SECONDS, Outcome, Question
 
@@ -100,7 +101,19 @@ def simulate(question: Question, seconds: float = SECONDS) -> Outcome:
         raise NotConverged(message, best=_joints(plant, q), residual=float("inf"), iterations=round(seconds / TIME_STEP))
     results = plant.get_contact_results_output_port().Eval(context)
     contacts = results.num_point_pair_contacts() + results.num_hydroelastic_contacts()
-    return Outcome(_joints(plant, q), speed, contacts, round(seconds / TIME_STEP), elapsed)
+    return Outcome(_joints(plant, q), speed, contacts, round(seconds / TIME_STEP), elapsed, _obstacle_forces(plant, results))
+
+
+def _obstacle_forces(plant: Any, results: Any) -> dict[str, FloatArray]:
+    """Sum of the forces of each link of a model that is not the robot's on the robot."""
+    forces: dict[str, FloatArray] = {}
+    for number in range(results.num_point_pair_contacts()):
+        contact = results.point_pair_contact_info(number)
+        bodies = [plant.get_body(index) for index in (contact.bodyA_index(), contact.bodyB_index())]
+        for body, sign in zip(bodies, (1.0, -1.0), strict=True):  # Drake's is that on B
+            if plant.GetModelInstanceName(body.model_instance()).endswith(SURROUNDINGS):
+                forces[body.name()] = forces.get(body.name(), np.zeros(3)) + sign * np.asarray(contact.contact_force())
+    return forces
 
 
 def _fill(plant: Any, question: Question) -> None:

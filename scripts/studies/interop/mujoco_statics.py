@@ -85,7 +85,23 @@ def simulate(question: Question, seconds: float = SECONDS) -> Outcome:
     if any(bad):
         message = f"MuJoCo found its simulation unstable {sum(bad)} times in {seconds:g} s and started it anew"
         raise NotConverged(message, best=_joints(model, data.qpos), residual=float("inf"), iterations=done)
-    return Outcome(_joints(model, data.qpos), float(np.abs(data.qvel).max(initial=0.0)), contacts, done, elapsed)
+    forces = obstacle_forces(mujoco, model, data)
+    return Outcome(_joints(model, data.qpos), float(np.abs(data.qvel).max(initial=0.0)), contacts, done, elapsed, forces)
+
+
+def obstacle_forces(mujoco: Any, model: Any, data: Any) -> dict[str, FloatArray]:
+    """Return the force of each obstacle that touches on the robot, by the name of its geom, world axes, shape (3,) [N]."""
+    forces: dict[str, FloatArray] = {}
+    pressed = np.zeros(6)
+    for number in range(data.ncon):
+        contact = data.contact[number]
+        mujoco.mj_contactForce(model, data, number, pressed)
+        on_second = contact.frame.reshape(3, 3).T @ pressed[:3]  # of the pair of geoms
+        for geom, sign in zip(contact.geom.tolist(), (1.0, -1.0), strict=True):
+            name = model.geom(geom).name
+            if name:  # only obstacles have one
+                forces[name] = forces.get(name, np.zeros(3)) + sign * on_second
+    return forces
 
 
 def tip_pose(question: Question, joints: Mapping[str, float]) -> FloatArray:

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from types import MappingProxyType
 from typing import NamedTuple
 
+from softrobots.core.checks import FloatArray
 from studies.interop.cases import Gravity
 
 SECONDS = 60.0
@@ -36,3 +39,5 @@ class Outcome(NamedTuple):
     """Iterations of Newton's method, or time steps."""
     wall_time: float
     """Time of the computation, without loading the file [s]."""
+    forces: Mapping[str, FloatArray] = MappingProxyType({})
+    """Force of each obstacle that touches on the robot, by its name, world axes, shape (3,) [N]."""

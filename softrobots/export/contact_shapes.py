@@ -1,0 +1,99 @@
+"""What touches in an exported file: the capsules of a robot and the obstacles around it, in place of the shapes of its URDF.
+
+Statics has rigid contact of capsules with obstacles (`softrobots.statics.contact`). Simulators have stiff springs there; each
+exporter says how stiff. The collision shapes of the URDF are left out, because they are others, and shorter.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+
+from softrobots.core.checks import FloatArray, non_negative_number, read_only
+from softrobots.core.errors import ParameterError
+from softrobots.description.rigid_tree import Placement, RigidTree, Shape
+from softrobots.description.urdf_tags import CapsuleTag
+from softrobots.environment.environment import Environment
+from softrobots.environment.obstacles import Box, HalfSpace, Obstacle
+
+_COLOUR = (0.72, 0.72, 0.68, 1.0)  # of obstacles
+
+
+@dataclass(frozen=True, eq=False)
+class ContactShapes:
+    """Obstacles, fixed in the world, and who collides."""
+
+    obstacles: Mapping[str, Shape]
+    """Shape by name of the obstacle; "plane" has its surface at z = 0 and nothing above it, "capsule" radius and length."""
+    vertices: Mapping[str, FloatArray]
+    """Vertices of meshes by name of the obstacle, in the axes of its shape, shape (n, 3) [m]."""
+    friction: float
+    """Coefficient of friction."""
+    self_contact: bool
+    """Whether capsules of the robot collide with each other, neighbours excluded."""
+
+    @property
+    def remark(self) -> str:
+        """What touches, for the head of the file."""
+        among = "and, but for neighbours, each other" if self.self_contact else "and not each other"
+        slip = f"with the coefficient of friction {self.friction!r}" if self.friction else "without friction"
+        return f"Capsules of the robot touch {', '.join(self.obstacles)} {among}, {slip}."
+
+
+def contact_shapes(environment: Any, friction: Any) -> ContactShapes | None:
+    """Return the obstacles of an environment as shapes; None for no environment.
+
+    Raises:
+        ParameterError: If it is no environment, an obstacle of it moves, or the friction is negative, or given for no environment.
+    """
+    coefficient = non_negative_number("friction", friction, "-")
+    if environment is None:
+        if coefficient:
+            raise ParameterError("friction", friction, "left out, or given with an environment")
+        return None
+    if not isinstance(environment, Environment):
+        raise ParameterError("environment", environment, "an Environment, or None")
+    named = dict(zip(environment.names, environment.obstacles, strict=True))
+    moved = [name for name, obstacle in named.items() if obstacle.moves]
+    if moved:
+        requirement = f"one whose obstacles stand still, environment.at(parameter): {', '.join(moved)} would move"
+        raise ParameterError("environment", environment, requirement)
+    return ContactShapes(
+        obstacles={name: _shape(obstacle) for name, obstacle in named.items()},
+        vertices={name: obstacle.vertices for name, obstacle in named.items() if obstacle.kind == "mesh"},
+        friction=coefficient,
+        self_contact=environment.self_contact,
+    )
+
+
+def with_capsules(tree: RigidTree, capsules: Sequence[CapsuleTag]) -> RigidTree:
+    """Return the robot with its capsules in place of its collision shapes."""
+    shapes: dict[str, list[Shape]] = {}
+    for capsule in capsules:
+        shapes.setdefault(capsule.link, []).append(_capsule(capsule))
+    return replace(tree, bodies=tuple(replace(body, collisions=tuple(shapes.get(body.name, ()))) for body in tree.bodies))
+
+
+def _capsule(tag: CapsuleTag) -> Shape:
+    start, end = np.array(tag.start), np.array(tag.end)
+    length = float(np.linalg.norm(end - start))
+    if length == 0.0:
+        return Shape("sphere", (tag.radius,), Placement(read_only(start)))
+    return Shape("capsule", (tag.radius, length), Placement(read_only(0.5 * (start + end)), _turned_to((end - start) / length)))
+
+
+def _shape(obstacle: Obstacle) -> Shape:
+    transform = obstacle.transform_to_world
+    placement = Placement(read_only(transform[:3, 3].copy()), read_only(transform[:3, :3].copy()))
+    size: Any = obstacle.size if isinstance(obstacle, Box) else [getattr(obstacle, name, None) for name in ("radius", "length")]
+    kind = "plane" if isinstance(obstacle, HalfSpace) else obstacle.kind
+    return Shape(kind, tuple(float(value) for value in size if value is not None), placement, _COLOUR)
+
+
+def _turned_to(axis: FloatArray) -> FloatArray:
+    """A rotation that turns z to a unit axis."""
+    return read_only(np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).toRotationMatrix()))

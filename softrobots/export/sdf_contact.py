@@ -1,0 +1,58 @@
+"""Contact in SDF: obstacles as a model that stands still, and how stiff contact is in Drake.
+
+Drake's point contact is a spring of `STIFFNESS` in each of two bodies, one behind the other: a normal force `f` presses them into
+each other by `2 f / STIFFNESS`. That holds for its default approximation, "lagged", and for "similar"; "sap" makes contact softer
+at large time steps. One pair of shapes has one contact. Gazebo does not read the stiffness, only the friction.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+
+from softrobots.export.contact_shapes import ContactShapes
+from softrobots.export.sdf_parts import DRAKE, write_colour, write_geometry, write_number, write_pose
+
+STIFFNESS = 1e8
+"""Stiffness of each body in Drake's point contact [N/m]."""
+
+SURROUNDINGS = "surroundings"
+"""Name of the model of the obstacles."""
+
+_DISSIPATION = 1.0  # [s/m], of Hunt and Crossley's law
+
+HARDNESS = f"Contact in Drake is a spring of {0.5 * STIFFNESS:g} N/m, with the dissipation {2.0 * _DISSIPATION:g} s/m."
+"""How stiff contact is, for the head of the file."""
+
+
+def write_obstacles(world: ElementTree.Element, contact: ContactShapes) -> None:
+    """Write a static model of the obstacles, a link for each.
+
+    Raises:
+        ParameterError: If an obstacle is a mesh that Drake cannot read.
+    """
+    model = ElementTree.SubElement(world, "model", {"name": SURROUNDINGS})
+    ElementTree.SubElement(model, "static").text = "true"
+    for name, shape in contact.obstacles.items():
+        file = contact.drake_file(name)
+        link = ElementTree.SubElement(model, "link", {"name": name})
+        write_pose(link, shape.placement)
+        for kind in ("visual", "collision"):
+            element = ElementTree.SubElement(link, kind, {"name": kind})
+            write_geometry(element, shape, file)
+            if kind == "visual" and shape.rgba is not None:
+                write_colour(element, shape.rgba)
+            if kind == "collision":
+                write_hardness(element, contact.friction)
+
+
+def write_hardness(collision: ElementTree.Element, friction: float) -> None:
+    """Write stiffness, dissipation and friction of a collision shape, for Drake and (friction) for Gazebo."""
+    surface = ElementTree.SubElement(ElementTree.SubElement(collision, "surface"), "friction")
+    gazebo = ElementTree.SubElement(surface, "ode")
+    for name in ("mu", "mu2"):
+        write_number(gazebo, name, friction)
+    properties = ElementTree.SubElement(collision, f"{{{DRAKE}}}proximity_properties")
+    write_number(properties, f"{{{DRAKE}}}point_contact_stiffness", STIFFNESS)
+    write_number(properties, f"{{{DRAKE}}}hunt_crossley_dissipation", _DISSIPATION)
+    for name in ("mu_static", "mu_dynamic"):
+        write_number(properties, f"{{{DRAKE}}}{name}", friction)
