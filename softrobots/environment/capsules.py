@@ -33,11 +33,7 @@ class RobotCapsule:
 
 
 def robot_capsules(model: SoftModel) -> tuple[RobotCapsule, ...]:
-    """Return the capsules of a robot.
-
-    They are the tags `<softrobots:capsule>` of its description. In a file without any, spheres and cylinders of its
-    `<collision>` tags count, cylinders as capsules of the same axis and radius, which are a cap longer at both ends; boxes and
-    meshes beside them do not count.
+    """Return the capsules of a robot (`capsule_tags`), on its joints.
 
     Args:
         model: The robot.
@@ -49,14 +45,27 @@ def robot_capsules(model: SoftModel) -> tuple[RobotCapsule, ...]:
         ParameterError: If `model` is not a `SoftModel`.
         DescriptionError: If the description has neither capsules nor collision shapes that are spheres or cylinders.
     """
-    tags = check_model(model).structure.tags.capsules or _of_collisions(model)
-    frames, capsules = model.pinocchio.frames, []
-    for tag in tags:
+    frames, capsules = check_model(model).pinocchio.frames, []
+    for tag in capsule_tags(model):
         number = model.frame_id(tag.link)
         frame = frames[number]
         start, end = (read_only(np.asarray(frame.placement.act(np.array(point)))) for point in (tag.start, tag.end))
         capsules.append(RobotCapsule(tag.link, number, frame.parentJoint, start, end, tag.radius))
     return tuple(capsules)
+
+
+def capsule_tags(model: SoftModel) -> tuple[CapsuleTag, ...]:
+    """Return the capsules of a robot on its links.
+
+    They are the tags `<softrobots:capsule>` of its description. In a file without any, spheres and cylinders of its
+    `<collision>` tags count, cylinders as capsules of the same axis and radius, which are a cap longer at both ends; boxes and
+    meshes beside them do not count.
+
+    Raises:
+        ParameterError: If `model` is not a `SoftModel`.
+        DescriptionError: If the description has neither capsules nor collision shapes that are spheres or cylinders.
+    """
+    return check_model(model).structure.tags.capsules or _of_collisions(model)
 
 
 def _of_collisions(model: SoftModel) -> tuple[CapsuleTag, ...]:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from softrobots.core.checks import FloatArray, non_negative_number, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import Placement, RigidTree, Shape
 from softrobots.description.urdf_tags import CapsuleTag
-from softrobots.environment.environment import Environment
+from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacles import Box, HalfSpace, Obstacle
 
 _COLOUR = (0.72, 0.72, 0.68, 1.0)  # of obstacles
@@ -31,6 +32,8 @@ class ContactShapes:
     """Shape by name of the obstacle; "plane" has its surface at z = 0 and nothing above it, "capsule" radius and length."""
     vertices: Mapping[str, FloatArray]
     """Vertices of meshes by name of the obstacle, in the axes of its shape, shape (n, 3) [m]."""
+    files: Mapping[str, Path]
+    """Files of meshes by name of the obstacle, where they have one."""
     friction: float
     """Coefficient of friction."""
     self_contact: bool
@@ -48,26 +51,31 @@ def contact_shapes(environment: Any, friction: Any) -> ContactShapes | None:
     """Return the obstacles of an environment as shapes; None for no environment.
 
     Raises:
-        ParameterError: If it is no environment, an obstacle of it moves, or the friction is negative, or given for no environment.
+        ParameterError: If it is no environment, an obstacle of it moves, or friction is negative, or given for no environment.
     """
     coefficient = non_negative_number("friction", friction, "-")
     if environment is None:
         if coefficient:
             raise ParameterError("friction", friction, "left out, or given with an environment")
         return None
-    if not isinstance(environment, Environment):
-        raise ParameterError("environment", environment, "an Environment, or None")
-    named = dict(zip(environment.names, environment.obstacles, strict=True))
-    moved = [name for name, obstacle in named.items() if obstacle.moves]
+    checked = fixed_environment(environment)
+    return ContactShapes(
+        obstacles={obstacle.name: _shape(obstacle) for obstacle in checked},
+        vertices={obstacle.name: obstacle.vertices for obstacle in checked if obstacle.kind == "mesh"},
+        files={},
+        friction=coefficient,
+        self_contact=checked.self_contact,
+    )
+
+
+def fixed_environment(environment: Any) -> Environment:
+    """Return `environment` if it is one whose obstacles stand still, or raise ParameterError."""
+    checked = check_environment(environment)
+    moved = [obstacle.name for obstacle in checked if obstacle.moves]
     if moved:
         requirement = f"one whose obstacles stand still, environment.at(parameter): {', '.join(moved)} would move"
         raise ParameterError("environment", environment, requirement)
-    return ContactShapes(
-        obstacles={name: _shape(obstacle) for name, obstacle in named.items()},
-        vertices={name: obstacle.vertices for name, obstacle in named.items() if obstacle.kind == "mesh"},
-        friction=coefficient,
-        self_contact=environment.self_contact,
-    )
+    return checked
 
 
 def with_capsules(tree: RigidTree, capsules: Sequence[CapsuleTag]) -> RigidTree:

@@ -18,6 +18,7 @@ from softrobots.export.mjcf_contact import (
     SOFTNESS,
     capsule_bits,
     solid_size,
+    steadying_armature,
     where,
     write_contact_defaults,
     write_obstacles,
@@ -183,7 +184,10 @@ class _Bodies:
         damping = self._damping.get(joint.name, joint.damping)
         if damping > 0.0:
             attributes["damping"] = repr(damping)
-        for name, value in (("frictionloss", joint.friction if spring is None else 0.0), ("armature", joint.rotor_inertia)):
+        armature = joint.rotor_inertia
+        if spring is not None and self._robot.contact is not None:
+            armature += steadying_armature(damping)
+        for name, value in (("frictionloss", joint.friction if spring is None else 0.0), ("armature", armature)):
             if value > 0.0:
                 attributes[name] = repr(value)
         ElementTree.SubElement(element, "joint", attributes)

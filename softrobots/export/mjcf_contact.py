@@ -5,8 +5,13 @@ MuJoCo has no rigid contact. At rest, the normal force `f` of a contact presses 
 .. math:: \delta = (1 - d)\, T^2 f / m
 
 (MuJoCo's documentation, "Solver parameters", with no acceleration), with the impedance `d`, the time constant `T` of `solref`,
-and the mass `m` that MuJoCo finds behind the contact in the unbent robot. `T` is two of MuJoCo's default time steps, the least
-that it allows, and `d` its largest: some 0.03 micrometres for 5 N on the last link of an inflatable arm.
+and the mass `m` that MuJoCo finds behind the contact in the unbent robot. `T` is two of MuJoCo's default time steps `h`, the
+least that it allows, and `d` its largest: some 0.03 micrometres for 5 N on the last link of an inflatable arm.
+
+MuJoCo computes contact forces with the masses alone, and moves the joints by the masses and `h D`, with the dampings `D` of the
+springs. Where `h D` is larger than the masses, as in chains of light links, contacts then chatter and never rest (we found so
+below an armature of `h D`). So the springs have the armature `2 h D`, which changes no equilibrium, and slows a mode of the
+frequency `w` that the springs damp by :math:`\beta K` by the fraction :math:`h \beta w^2`.
 """
 
 from __future__ import annotations
@@ -18,12 +23,14 @@ import numpy as np
 from softrobots.description.rigid_tree import Placement, Shape, number_text
 from softrobots.export.contact_shapes import ContactShapes
 
-_IMPEDANCE, _TIME_CONSTANT = 0.9999, 0.004  # [-], [s]
+_IMPEDANCE, _TIME_STEP = 0.9999, 0.002  # [-], [s]
+_TIME_CONSTANT = 2.0 * _TIME_STEP
 _OBSTACLES, _ROBOT = 1, 2  # bits of MuJoCo's contype and conaffinity
 
 SOFTNESS = (
-    f"Contact is as hard as it is stable at time steps of 2 ms or less: a contact with the force f and the mass m behind it gives "
-    f"way by about f/m times {(1.0 - _IMPEDANCE) * _TIME_CONSTANT**2:.2g} s^2."
+    f"Contact is as hard as it is stable with time steps of {1e3 * _TIME_STEP:g} ms or less: with the force f and the mass m "
+    f"behind it, it gives way by {(1.0 - _IMPEDANCE) * _TIME_CONSTANT**2:.2g} s^2 f/m. The armature of the springs keeps it "
+    "from chattering, and changes no equilibrium."
 )
 """How stiff contact is, for the head of the file."""
 
@@ -47,13 +54,19 @@ def capsule_bits(contact: ContactShapes) -> dict[str, str]:
     return {"contype": str(among), "conaffinity": str(_OBSTACLES | among)}
 
 
+def steadying_armature(damping: float) -> float:
+    """Return the armature of a spring joint with a damping [N m s/rad or N s/m] with which contacts come to rest."""
+    return 2.0 * _TIME_STEP * damping
+
+
 def write_obstacles(world: ElementTree.Element, assets: ElementTree.Element, contact: ContactShapes) -> None:
     """Write the obstacles as geoms of the world with their names; vertices of meshes stand in the file."""
     for name, shape in contact.obstacles.items():
         measure = solid_size(shape)
         if name in contact.vertices:
             measure = {"mesh": f"obstacle/{name}"}  # no name of a file
-            ElementTree.SubElement(assets, "mesh", {"name": measure["mesh"], "vertex": number_text(contact.vertices[name].flat)})
+            corners = number_text(contact.vertices[name].flat)
+            ElementTree.SubElement(assets, "mesh", {"name": measure["mesh"], "vertex": corners})
         attributes = {"name": name, "type": shape.kind, **measure, **where(shape.placement)}
         bits = {"contype": str(_OBSTACLES), "conaffinity": "0"}
         ElementTree.SubElement(world, "geom", attributes | {"rgba": number_text(shape.rgba or ())} | bits)

@@ -17,6 +17,7 @@ from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import SpringTag
+from softrobots.environment.capsules import capsule_tags
 from softrobots.export.contact_shapes import ContactShapes, contact_shapes, with_capsules
 from softrobots.export.damping import checked_damping, damped, lowest_frequency, mass_matrix, rule_text
 from softrobots.export.held import ACTUATORS, check_linear, hold, weld
@@ -96,7 +97,7 @@ def prepare(
     tree = weld(tree, fixed)
     _refuse_massless(tree)
     if contact is not None:
-        tree = with_capsules(tree, checked.structure.tags.capsules)
+        tree = with_capsules(tree, capsule_tags(checked))
     swings = rule == "critical" and bool(springs)
     mass = mass_matrix(checked, values) if swings or (positions and not welded) else np.zeros((0, 0))
     frequency = lowest_frequency(checked, mass) if swings else None

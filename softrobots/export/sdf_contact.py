@@ -1,8 +1,8 @@
 """Contact in SDF: obstacles as a model that stands still, and how stiff contact is in Drake.
 
-Drake's point contact is a spring of `STIFFNESS` in each of two bodies, one behind the other: a normal force `f` presses them into
-each other by `2 f / STIFFNESS`. That holds for its default approximation, "lagged", and for "similar"; "sap" makes contact softer
-at large time steps. One pair of shapes has one contact. Gazebo does not read the stiffness, only the friction.
+Drake's point contact is a spring of `STIFFNESS` in each of two bodies, one behind the other: a normal force `f` presses them
+into each other by `2 f / STIFFNESS`. That holds for its default approximation, "lagged", and for "similar"; "sap" makes contact
+softer at large time steps. A pair of shapes has one contact. Gazebo does not read the stiffness, only the friction.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ def write_obstacles(world: ElementTree.Element, contact: ContactShapes) -> None:
     model = ElementTree.SubElement(world, "model", {"name": SURROUNDINGS})
     ElementTree.SubElement(model, "static").text = "true"
     for name, shape in contact.obstacles.items():
-        file = contact.drake_file(name)
+        file = contact.files.get(name)
         link = ElementTree.SubElement(model, "link", {"name": name})
         write_pose(link, shape.placement)
         for kind in ("visual", "collision"):
@@ -46,13 +46,11 @@ def write_obstacles(world: ElementTree.Element, contact: ContactShapes) -> None:
 
 
 def write_hardness(collision: ElementTree.Element, friction: float) -> None:
-    """Write stiffness, dissipation and friction of a collision shape, for Drake and (friction) for Gazebo."""
+    """Write friction, for all tools, and Drake's stiffness and dissipation of a collision shape."""
     surface = ElementTree.SubElement(ElementTree.SubElement(collision, "surface"), "friction")
-    gazebo = ElementTree.SubElement(surface, "ode")
+    coefficients = ElementTree.SubElement(surface, "ode")
     for name in ("mu", "mu2"):
-        write_number(gazebo, name, friction)
+        write_number(coefficients, name, friction)
     properties = ElementTree.SubElement(collision, f"{{{DRAKE}}}proximity_properties")
     write_number(properties, f"{{{DRAKE}}}point_contact_stiffness", STIFFNESS)
     write_number(properties, f"{{{DRAKE}}}hunt_crossley_dissipation", _DISSIPATION)
-    for name in ("mu_static", "mu_dynamic"):
-        write_number(properties, f"{{{DRAKE}}}{name}", friction)

@@ -16,6 +16,8 @@ from softrobots.description.actuator_reader import NUMBERS
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import CapsuleTag, FrictionTag, LumpedSectionTag, SectionTag, SpringTag
+from softrobots.environment.environment import Environment
+from softrobots.export.contact_shapes import fixed_environment
 from softrobots.export.number_sources import Rules, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model
@@ -70,10 +72,13 @@ _CONVENTIONS = {
     "lines": "lines along a segment that are drawn and do nothing",
     "capsules": "hold the body closely, for contact with surroundings: all points at most radius away from the segment from "
     "start to end, in the frame of link; neighbours overlap",
+    "environment": "obstacles, as softrobots.Environment.from_dict reads them: lengths in m; rotation, a matrix with their axes "
+    "as columns, and position in world axes, pose a transform of both; a half_space leaves free where normal . x >= offset; "
+    "length of a capsule is that of its core",
 }
 
 
-def to_json(model: SoftModel, robot: XacroRobot | None = None) -> str:
+def to_json(model: SoftModel, robot: XacroRobot | None = None, *, environment: Environment | None = None) -> str:
     """Write as JSON what URDF readers ignore: springs, roles, sections and muscles.
 
     The source of a number is the tag of the URDF or the caller of `load_model`; given the robot, it is an expression in the
@@ -82,12 +87,13 @@ def to_json(model: SoftModel, robot: XacroRobot | None = None) -> str:
     Args:
         model: The robot.
         robot: The robot of this package that the model was loaded from, for its parameters.
+        environment: Obstacles around the robot, which stand still.
 
     Returns:
         JSON text, with all that `load_model` needs besides the URDF: springs, motors, tip and muscle input.
 
     Raises:
-        ParameterError: If `model` is not a `SoftModel`, or was not loaded from `robot`.
+        ParameterError: If `model` is not a `SoftModel`, or was not loaded from `robot`; or obstacles move.
     """
     checked = check_model(model)
     rules: Rules = {}
@@ -108,6 +114,8 @@ def to_json(model: SoftModel, robot: XacroRobot | None = None) -> str:
         content |= {"parameters": _parameters(robot), "derived": derived_numbers(robot)}
     content |= {"tip": checked.tip, "muscle_input": checked.muscle_input}
     content |= _Parts(checked, rules).all()
+    if environment is not None:
+        content |= {"environment": fixed_environment(environment).to_dict()}
     return _text(content, "") + "\n"
 
 

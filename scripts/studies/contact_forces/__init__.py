@@ -1,0 +1,1 @@
+"""Contact forces in MuJoCo and Drake against ours; see scripts/contact_forces.py."""
