@@ -32,10 +32,15 @@ def main(argv: list[str] | None = None) -> int:
         if arguments.docs is not None:
             check_page(arguments.docs, NAME, page=PAGE)
         pairs = [(name, simulator) for name in CASES for simulator in SIMULATORS]
-        rows = [compare(name, CASES[name](), simulator) for name, simulator in with_progress(pairs, True, label="settling", unit="case")]
+        rows = [
+            compare(name, CASES[name](), simulator)
+            for name, simulator in with_progress(pairs, True, label="settling", unit="case")
+        ]
         print(table(rows))
         if arguments.docs is not None:
-            write_record(arguments.docs, NAME, table(rows), as_data(rows), command="python scripts/contact_forces.py", page=PAGE)
+            write_record(
+                arguments.docs, NAME, table(rows), as_data(rows), command="python scripts/contact_forces.py", page=PAGE
+            )
         return all(row.agrees for row in rows)
 
     return exit_status(run)

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,10 +29,6 @@ class ContactShapes:
 
     obstacles: Mapping[str, Shape]
     """Shape by name of the obstacle; "plane" has its surface at z = 0 and nothing above it, "capsule" radius and length."""
-    vertices: Mapping[str, FloatArray]
-    """Vertices of meshes by name of the obstacle, in the axes of its shape, shape (n, 3) [m]."""
-    files: Mapping[str, Path]
-    """Files of meshes by name of the obstacle, where they have one."""
     friction: float
     """Coefficient of friction."""
     self_contact: bool
@@ -60,9 +55,7 @@ def contact_shapes(environment: Any, friction: Any) -> ContactShapes | None:
         return None
     checked = fixed_environment(environment)
     return ContactShapes(
-        obstacles={obstacle.name: _shape(obstacle) for obstacle in checked},
-        vertices={obstacle.name: obstacle.vertices for obstacle in checked if obstacle.kind == "mesh"},
-        files={},
+        obstacles={str(obstacle.name): _shape(obstacle) for obstacle in checked},
         friction=coefficient,
         self_contact=checked.self_contact,
     )
@@ -71,7 +64,7 @@ def contact_shapes(environment: Any, friction: Any) -> ContactShapes | None:
 def fixed_environment(environment: Any) -> Environment:
     """Return `environment` if it is one whose obstacles stand still, or raise ParameterError."""
     checked = check_environment(environment)
-    moved = [obstacle.name for obstacle in checked if obstacle.moves]
+    moved = [str(obstacle.name) for obstacle in checked if obstacle.moves]
     if moved:
         requirement = f"one whose obstacles stand still, environment.at(parameter): {', '.join(moved)} would move"
         raise ParameterError("environment", environment, requirement)

@@ -55,7 +55,8 @@ def export_model(
         path: The file.
         format: Name of the format, one of `FORMATS`; by default from the suffix of the file, if only one format has it.
         overwrite: Whether a file that exists may be replaced.
-        options: For the exporter: `q_motors`, `actuators`, `damping`, `gravity`, `limits`, `robot`; see `to_mjcf` ...
+        options: For the exporter: `q_motors`, `actuators`, `damping`, `gravity`, `limits`, `environment`, `friction`, `robot`;
+            see `to_mjcf` ...
 
     Returns:
         The path.

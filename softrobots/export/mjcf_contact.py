@@ -59,15 +59,10 @@ def steadying_armature(damping: float) -> float:
     return 2.0 * _TIME_STEP * damping
 
 
-def write_obstacles(world: ElementTree.Element, assets: ElementTree.Element, contact: ContactShapes) -> None:
-    """Write the obstacles as geoms of the world with their names; vertices of meshes stand in the file."""
+def write_obstacles(world: ElementTree.Element, contact: ContactShapes) -> None:
+    """Write the obstacles as geoms of the world with their names."""
     for name, shape in contact.obstacles.items():
-        measure = solid_size(shape)
-        if name in contact.vertices:
-            measure = {"mesh": f"obstacle/{name}"}  # no name of a file
-            corners = number_text(contact.vertices[name].flat)
-            ElementTree.SubElement(assets, "mesh", {"name": measure["mesh"], "vertex": corners})
-        attributes = {"name": name, "type": shape.kind, **measure, **where(shape.placement)}
+        attributes = {"name": name, "type": shape.kind, **solid_size(shape), **where(shape.placement)}
         bits = {"contype": str(_OBSTACLES), "conaffinity": "0"}
         ElementTree.SubElement(world, "geom", attributes | {"rgba": number_text(shape.rgba or ())} | bits)
 

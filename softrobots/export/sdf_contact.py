@@ -25,20 +25,15 @@ HARDNESS = f"Contact in Drake is a spring of {0.5 * STIFFNESS:g} N/m, with the d
 
 
 def write_obstacles(world: ElementTree.Element, contact: ContactShapes) -> None:
-    """Write a static model of the obstacles, a link for each.
-
-    Raises:
-        ParameterError: If an obstacle is a mesh that Drake cannot read.
-    """
+    """Write a static model of the obstacles, a link for each."""
     model = ElementTree.SubElement(world, "model", {"name": SURROUNDINGS})
     ElementTree.SubElement(model, "static").text = "true"
     for name, shape in contact.obstacles.items():
-        file = contact.files.get(name)
         link = ElementTree.SubElement(model, "link", {"name": name})
         write_pose(link, shape.placement)
         for kind in ("visual", "collision"):
             element = ElementTree.SubElement(link, kind, {"name": kind})
-            write_geometry(element, shape, file)
+            write_geometry(element, shape, None)
             if kind == "visual" and shape.rgba is not None:
                 write_colour(element, shape.rgba)
             if kind == "collision":

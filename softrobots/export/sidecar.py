@@ -72,9 +72,8 @@ _CONVENTIONS = {
     "lines": "lines along a segment that are drawn and do nothing",
     "capsules": "hold the body closely, for contact with surroundings: all points at most radius away from the segment from "
     "start to end, in the frame of link; neighbours overlap",
-    "environment": "obstacles, as softrobots.Environment.from_dict reads them: lengths in m; rotation, a matrix with their axes "
-    "as columns, and position in world axes, pose a transform of both; a half_space leaves free where normal . x >= offset; "
-    "length of a capsule is that of its core",
+    "environment": "obstacles, as Environment.from_dict of softrobots reads them: lengths in m, columns of rotation are axes, "
+    "pose moves position and rotation; a half_space is free where normal . x >= offset; length of a capsule is its core's",
 }
 
 

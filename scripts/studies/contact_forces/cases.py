@@ -1,4 +1,4 @@
-"""Robots on obstacles: a wall, a ball, an edge, a rim, a corner and pegs. Nothing touches at rest; the load presses."""
+"""Robots on obstacles: a wall, a ball, an edge, a rim and pegs. Nothing touches at rest; the load presses."""
 
 from __future__ import annotations
 
@@ -11,7 +11,6 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.environment.environment import Environment
-from softrobots.environment.mesh import Mesh
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
@@ -26,6 +25,7 @@ MOTORS = (0.3, 0.6, -0.8)
 TENSIONS = (5.0,) * 6
 """Of the muscles of the lumped arm [N]: it stands straight up."""
 _DOWN, _ASIDE, _ON_PEGS = (0.0, 0.0, -20.0), (0.0, 15.0, 0.0), (-6.0, 1.0, 0.0)
+_WALL = np.array([0.1, -1.0, 0.05]) / math.sqrt(1.0125)
 _ALONG_Y = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))  # turns z to y
 
 
@@ -46,9 +46,7 @@ class ContactCase:
 
     def solve(self) -> Equilibrium:
         """Return our equilibrium."""
-        return solve_equilibrium(
-            self.model, self.q_motors, self.force, gravity=self.gravity, environment=self.environment
-        )
+        return solve_equilibrium(self.model, self.q_motors, self.force, gravity=self.gravity, environment=self.environment)
 
     def tip(self, joints: Mapping[str, float]) -> FloatArray:
         """Position of the tip with spring joints at given coordinates, by name, shape (3,) [m]."""
@@ -84,24 +82,25 @@ def _turned(angle: float) -> FloatArray:
 
 def _under(at: FloatArray, depth: float) -> FloatArray:
     """A place below the tube at `at`, with a gap of a centimetre to an obstacle that reaches `depth` above it [m]."""
-    return at - np.array([0.0, 0.0, 0.055 + 0.01 + depth])
+    return np.asarray(at - np.array([0.0, 0.0, 0.055 + 0.01 + depth]))
 
 
 def _pegs() -> ContactCase:
     """An arm that a force bends around a peg and, below it, onto another, with a wall that it does not reach."""
-    pegs = [Cylinder(0.03, 0.4, (x, 0.0, z), _ALONG_Y, name=name) for name, x, z in (("left", -0.085, 0.6), ("right", 0.083, 0.3))]
+    pegs = [
+        Cylinder(0.03, 0.4, (x, 0.0, z), _ALONG_Y, name=name) for name, x, z in (("left", -0.085, 0.6), ("right", 0.083, 0.3))
+    ]
     return ContactCase(lumped_arm(), TENSIONS, _ON_PEGS, Environment([*pegs, HalfSpace((1.0, 0.0, 0.0), -0.3)]))
 
 
-_SPIKE = ((0.1, 0.0, 0.0), (-0.05, 0.08, 0.0), (-0.05, -0.08, 0.0), (0.01, 0.0, 0.2))
-
 CASES: Mapping[str, Callable[[], ContactCase]] = {
-    "arm on a wall": lambda: _on(_ASIDE, lambda at: HalfSpace((0.1, -1.0, 0.05), (at @ (0.1, -1.0, 0.05)) / 1.006 - 0.14)),
+    "arm on a wall": lambda: _on(_ASIDE, lambda at: HalfSpace(_WALL, float(at @ _WALL) - 0.14)),
     "arm on a ball": lambda: _on(_DOWN, lambda at: Sphere(0.1, _under(at, 0.1) + (0.0, 0.03, 0.0))),
-    "arm on the edge of a box": lambda: _on(_DOWN, lambda at: Box((0.2, 0.3, 0.2), _under(at, 0.1 * math.sqrt(2.0)), _turned(0.2))),
+    "arm on the edge of a box": lambda: _on(
+        _DOWN, lambda at: Box((0.2, 0.3, 0.2), _under(at, 0.1 * math.sqrt(2.0)), _turned(0.2))
+    ),
     "arm on the rim of a cylinder": lambda: _on(_DOWN, lambda at: Cylinder(0.05, 0.2, _under(at, 0.12))),
     "arm on a capsule": lambda: _on(_DOWN, lambda at: Capsule(0.05, 0.2, _under(at, 0.05), _ALONG_Y)),
-    "arm on the corner of a mesh": lambda: _on(_DOWN, lambda at: Mesh(vertices=_SPIKE, position=_under(at, 0.2))),
     "arm of muscles between pegs": _pegs,
 }
 """The cases by name."""

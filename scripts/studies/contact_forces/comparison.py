@@ -67,15 +67,19 @@ def settled(case: ContactCase, simulator: str, seconds: float = SECONDS) -> Outc
         MissingDependency: If it is not installed.
         NotConverged: If it does not stay finite.
     """
-    field = tuple(case.gravity)
     if simulator == "MuJoCo":
         text = to_mjcf(
-            case.model, case.q_motors, actuators="welded", damping="critical", gravity=field, environment=case.environment
+            case.model,
+            case.q_motors,
+            actuators="welded",
+            damping="critical",
+            gravity=case.gravity,
+            environment=case.environment,
         )
-        return mujoco_statics.simulate(Question(text, case.model.tip, case.force, field), seconds)
+        return mujoco_statics.simulate(Question(text, case.model.tip, case.force, case.gravity), seconds)
     if simulator == "Drake":
         text = to_sdf(case.model, case.q_motors, actuators="welded", damping="critical", environment=case.environment)
-        return drake_statics.simulate(Question(text, case.model.tip, case.force, field), seconds)
+        return drake_statics.simulate(Question(text, case.model.tip, case.force, case.gravity), seconds)
     raise ParameterError("simulator", simulator, f"one of {', '.join(SIMULATORS)}")
 
 
@@ -99,7 +103,9 @@ def table(rows: Sequence[Row]) -> str:
     lines.append("|---|---|---|---:|---:|---:|")
     for row in rows:
         sizes = ", ".join(f"{name} {np.linalg.norm(force):.4g}" for name, force in row.forces.items())
-        lines.append(line([row.case, row.simulator, sizes, f"{row.force_error:.0e}", f"{row.tip_error:.0e}", f"{row.speed:.0e}"]))
+        lines.append(
+            line([row.case, row.simulator, sizes, f"{row.force_error:.0e}", f"{row.tip_error:.0e}", f"{row.speed:.0e}"])
+        )
     allowed = ["allowed", "", "", f"{FORCE_TOLERANCE:g}", f"{TIP_TOLERANCE:g}", f"{REST:g}"]
     return "\n".join([*lines, line(allowed)])
 
