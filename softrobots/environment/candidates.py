@@ -49,14 +49,15 @@ def find_candidates(
     Returns:
         The candidates.
     """
-    ends = places.ends[cores.single_ends[:, 0], cores.single_ends[:, 1]]
+    ends = places.ends.reshape(-1, 3).take(cores.single_ends, 0)
     limits = margin + cores.radii
+    end_limits = limits.take(cores.end_capsules)[:, None]
     parts: list[tuple[Field, Any]] = []
     found: list[tuple[Any, ...]] = []
     for field, numbers in fields:
         distances = field.distance(ends)
-        near, which = np.nonzero(distances <= limits[cores.single_ends[:, 0], None])
-        capsules, features, points = cores.single_ends[near, 0], cores.single_ends[near, 1], ends[near]
+        near, which = (distances <= end_limits).nonzero()
+        capsules, features, points = cores.end_capsules.take(near), cores.end_features.take(near), ends.take(near, 0)
         values, normals = field.at(points, which)
         if not isinstance(field, HalfSpaces):
             # the distance changes by at most the length of the way: what is far at both ends is far between them
@@ -70,7 +71,7 @@ def find_candidates(
                 points = np.concatenate([points, inner.points])
                 values, normals = np.concatenate([values, inner.distances]), np.concatenate([normals, inner.normals])
         parts.append((field, which))
-        found.append((capsules, numbers[which], features, points, values, normals))
+        found.append((capsules, numbers.take(which), features, points, values, normals))
     if not found:
         nobody = np.zeros(0, dtype=np.intp)
         return Candidates([], nobody, nobody, nobody, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))

@@ -45,18 +45,20 @@ class Cores:
         self._local = np.concatenate([ends, np.ones((self.count, 2, 1))], axis=2)
         self.moves = self._motion()
         """1 where a joint coordinate moves a capsule, else 0, shape (n, nv)."""
-        self.single_ends = self._single_ends(model)
-        """Number of capsule and end (0 or 1) of each different end, shape (k, 2): neighbours share ends at a joint."""
-        self.end_numbers = self._end_numbers
-        """Row of `single_ends` of each end, shape (n, 2)."""
+        self.single_ends, numbers = self._single_ends(model)
+        """The different ones of all ends (start and end of the first core, of the second, ...): neighbours share joints."""
+        self.end_capsules, self.end_features = self.single_ends // 2, self.single_ends % 2
+        """Capsule of each of them, and whether it is the start (0) or the end (1) of its core."""
+        self.end_numbers = numbers.reshape(-1, 2)
+        """Place of start and end of each core among the different ends, shape (n, 2)."""
 
     def at(self, q: FloatArray) -> CorePlaces:
         """Return the cores at Pinocchio's configuration, shape (nq,)."""
         pin.computeJointJacobians(self._model, self._data, q)
         placements = self._data.oMi
-        transforms = np.array([placements[number].homogeneous for number in self._numbers]).reshape(-1, 4, 4)
-        ends = (self._local @ np.swapaxes(transforms[self.carrier, :3], 1, 2)).reshape(-1, 2, 3)
-        jacobian = np.array(self._data.J).reshape(6, self._model.nv)
+        transforms = np.array([placements[number].homogeneous for number in self._numbers])
+        ends = (self._local @ transforms.take(self.carrier, 0).swapaxes(1, 2))[:, :, :3]
+        jacobian = self._data.J.copy().reshape(6, self._model.nv)
         return CorePlaces(ends, ends[:, 1] - ends[:, 0], jacobian, transforms)
 
     def _motion(self) -> FloatArray:
@@ -67,7 +69,7 @@ class Cores:
                 row[joints[number].idx_v : joints[number].idx_v + joints[number].nv] = 1.0
         return moves
 
-    def _single_ends(self, model: SoftModel) -> Any:
+    def _single_ends(self, model: SoftModel) -> tuple[Any, Any]:
         """Ends of equal radius that are one material point: at one place, and of one velocity, in two configurations."""
         random = np.random.default_rng(0)
         same: Any = True
@@ -85,6 +87,4 @@ class Cores:
         radii = np.repeat(self.radii, 2)
         same = same & (radii[:, None] == radii)
         first = same.argmax(axis=1) if self.count else np.zeros(0, dtype=np.intp)
-        kept, numbers = np.unique(first, return_inverse=True)
-        self._end_numbers = numbers.reshape(-1, 2)
-        return np.stack([kept // 2, kept % 2], axis=1)
+        return np.unique(first, return_inverse=True)

@@ -23,7 +23,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
 from softrobots.environment.capsules import robot_capsules
 from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores
-from softrobots.environment.distance_fields import Field, HalfSpaces, cross
+from softrobots.environment.distance_fields import Field, HalfSpaces, cross, skew
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
 from softrobots.model.joint_loads import JointLoad
@@ -91,7 +91,7 @@ class Gaps:
     def _rows(self, rows: Any, directions: FloatArray, points: FloatArray, couples: Any) -> FloatArray:
         """Work of forces, shape (k, 3), at points of the cores, and of couples, per joint rate, shape (k, nv)."""
         wrenches = np.concatenate([directions, cross(points, directions) + couples], axis=1)
-        return np.asarray((wrenches @ self._places.jacobian) * self.moves[rows])
+        return np.asarray(wrenches.dot(self._places.jacobian) * self.moves[rows])
 
     def point_jacobian(self, rows: Any, points: FloatArray) -> FloatArray:
         """Velocity of material points of the robot per joint rate.
@@ -103,9 +103,8 @@ class Gaps:
         Returns:
             Shape (k, 3, nv).
         """
-        jacobian, moves = self._places.jacobian, self.moves[rows][:, None, :]
-        turned = cross(jacobian[3:].T, points[:, None, :])  # (k, nv, 3)
-        return np.asarray((jacobian[:3] + np.swapaxes(turned, 1, 2)) * moves)
+        linear, angular = self._places.jacobian[:3], self._places.jacobian[3:]
+        return np.asarray((linear - skew(points) @ angular) * self.moves.take(rows, 0)[:, None, :])
 
     def load(self, forces: FloatArray) -> JointLoad:
         """Return forces on the robot as dead forces at their material points.
@@ -117,23 +116,25 @@ class Gaps:
         Returns:
             The load on the joints; its potential is `-sum f . x`.
         """
-        normal = forces.ndim == 1
-        rows = np.flatnonzero(forces if normal else forces.any(axis=1))
-        vectors = forces[rows, None] * self.normals[rows] if normal else forces[rows]
-        points = self.core_points[rows]
-        if not normal:
-            points = points - self.radii[rows, None] * self.normals[rows]
+        normal, nv = forces.ndim == 1, self._places.jacobian.shape[1]
+        rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
+        if not len(rows):
+            return JointLoad(np.zeros(nv), np.zeros((0, nv)), np.zeros((0, nv)), None, None, 0.0, 0.0)
+        normals = self.normals.take(rows, 0)
+        points = self.core_points.take(rows, 0)
+        if normal:
+            vectors = forces.take(rows)[:, None] * normals
+        else:
+            vectors, points = forces.take(rows, 0), points - self.radii.take(rows)[:, None] * normals
         linear = self.point_jacobian(rows, points)
-        angular = self._places.jacobian[3:] * self.moves[rows][:, None, :]
-        by_force = -cross(vectors[:, None, :], np.swapaxes(linear, 1, 2))
-        nv = linear.shape[2]
+        angular = self._places.jacobian[3:] * self.moves.take(rows, 0)[:, None, :]
         return JointLoad(
-            torque=np.asarray((vectors[:, None, :] @ linear)[:, 0].sum(axis=0)),
+            torque=vectors.ravel().dot(linear.reshape(-1, nv)),
             angular=angular.reshape(-1, nv),
-            by_force=np.ascontiguousarray(np.swapaxes(by_force, 1, 2)).reshape(-1, nv),
+            by_force=(-skew(vectors) @ linear).reshape(-1, nv),
             by_moment=None,
             gravity_derivative=None,
-            potential=-float((vectors * points).sum()),
+            potential=-float(vectors.ravel().dot(points.ravel())),
             scale=self._reach * float(np.sqrt((vectors * vectors).sum(axis=1)).sum()),
         )
 
@@ -150,10 +151,13 @@ class Gaps:
         nv = self._places.jacobian.shape[1]
         found, weights, first = [np.zeros((0, nv))], [np.zeros(0)], 0
         for field, which in self._parts:
-            rows = first + np.flatnonzero(forces[first : first + len(which)])
-            if len(rows) and not isinstance(field, HalfSpaces):
-                self._curved(field, which[rows - first], rows, forces[rows], found, weights)
+            if not isinstance(field, HalfSpaces):
+                rows = first + forces[first : first + len(which)].nonzero()[0]
+                if len(rows):
+                    self._curved(field, which[rows - first], rows, forces[rows], found, weights)
             first += len(which)
+        if len(found) == 1:
+            return found[0], weights[0]
         return np.concatenate(found), np.concatenate(weights)
 
     def _curved(self, field: Field, which: Any, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
