@@ -59,6 +59,10 @@ def find_candidates(
         near, which = (distances <= end_limits).nonzero()
         capsules, features, points = cores.end_capsules.take(near), cores.end_features.take(near), ends.take(near, 0)
         values, normals = field.at(points, which)
+        close = (values <= limits.take(capsules)).nonzero()[0]
+        if len(close) < len(values):  # `distance` was a lower bound
+            which, capsules, features, points = (column.take(close, 0) for column in (which, capsules, features, points))
+            values, normals = values.take(close), normals.take(close, 0)
         if not isinstance(field, HalfSpaces):
             # the distance changes by at most the length of the way: what is far at both ends is far between them
             least = 0.5 * (distances[cores.end_numbers].sum(axis=1) - cores.lengths[:, None])

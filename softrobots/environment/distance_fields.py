@@ -15,7 +15,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 
-_ON_BORDER = 1e-9
+ON_BORDER = 1e-9
 """Distance beyond a face, over that from the body, below which a point belongs to the face; exact at crossed borders."""
 _TINY = 1e-300
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
@@ -30,7 +30,7 @@ class Field(Protocol):
         """Distance of the surface from the features within, shape (n,) [m]."""
 
     def distance(self, points: FloatArray) -> FloatArray:
-        """Distance of each point, shape (m, 3), from each body, shape (m, n) [m]."""
+        """Distance of each point, shape (m, 3), from each body, or a lower bound of it outside, shape (m, n) [m]."""
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance, shape (m,) [m], and normal, shape (m, 3), at points, shape (m, 3)."""
@@ -123,7 +123,7 @@ class RoundedBoxes(NamedTuple):
         """The same along both directions at a vertex or round end, zero along edge or axis, zero at faces."""
         local, beyond, outside = self._beyond(points, which)
         beyond = np.where(self.halves[which] > 0.0, beyond, np.inf)
-        curved = beyond > _ON_BORDER * outside[:, None]
+        curved = beyond > ON_BORDER * outside[:, None]
         count = curved.sum(axis=1) * (outside > _TINY)
         normal = np.maximum(np.abs(local) - self.halves[which], 0.0) * np.where(local < 0.0, -1.0, 1.0)
         normal /= np.maximum(outside, _TINY)[:, None]
@@ -191,7 +191,7 @@ class Cylinders(NamedTuple):
         across /= np.maximum(from_axis, 1.0 * (from_axis < _TINY))[:, None]
         outward = cross(across, np.broadcast_to([0.0, 0.0, 1.0], across.shape))
         upward = np.where(local[:, 2] < 0.0, -1.0, 1.0)
-        rim = (beyond > _ON_BORDER * outside[:, None]).all(axis=1) & (outside > _TINY)
+        rim = (beyond > ON_BORDER * outside[:, None]).all(axis=1) & (outside > _TINY)
         over = -slopes[:, 1:] * outward
         over[:, 2] = slopes[:, 0] * upward
         around = np.where(outside > _TINY, slopes[:, 0] / np.maximum(from_axis, _TINY), 0.0)

@@ -11,9 +11,10 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_number, instance_of
 from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 
-KINDS: dict[str, type[Obstacle]] = {kind.kind: kind for kind in (HalfSpace, Sphere, Box, Cylinder, Capsule)}
+KINDS: dict[str, type[Obstacle]] = {kind.kind: kind for kind in (HalfSpace, Sphere, Box, Cylinder, Capsule, Mesh)}
 """Obstacles by their kind in plain data."""
 
 _POSE_STEP = 1e-5

@@ -55,10 +55,11 @@ def core_points(
     count = len(which)
     length = np.sqrt((spans * spans).sum(axis=1))
     borders = field.borders(starts, spans, which)
-    order = np.argsort(np.where((borders > 0.0) & (borders < 1.0), borders, 2.0), axis=1)
-    shares = np.take_along_axis(borders, order, axis=1)
-    shares = np.where((shares > 0.0) & (shares < 1.0), shares, 1.0)
-    shares = np.concatenate([np.zeros((count, 1)), shares, np.ones((count, 1))], axis=1)
+    crossed = (borders > 0.0) & (borders < 1.0)
+    used = np.flatnonzero(crossed.any(axis=0))
+    borders = np.where(crossed, borders, 1.0)[:, used]
+    order = borders.argsort(axis=1)
+    shares = np.concatenate([np.zeros((count, 1)), np.take_along_axis(borders, order, axis=1), np.ones((count, 1))], axis=1)
     points = starts[:, None] + shares[:, :, None] * spans[:, None]
     flat = field.at(points.reshape(-1, 3), np.repeat(which, shares.shape[1]))
     distances, normals = flat[0].reshape(shares.shape), flat[1].reshape(points.shape)
@@ -73,8 +74,8 @@ def core_points(
     keep = (shares[:, 1:-1] * length[:, None] > merged) & ((1.0 - shares[:, 1:-1]) * length[:, None] > merged)
     keep &= distances[:, 1:-1] <= limits[:, None]
     standing = np.maximum(minimum, 0.0)
-    for shift in (-1, 0):  # the borders before and after the minimum
-        border = np.clip(place + shift, 0, keep.shape[1] - 1)
+    for shift in (-1, 0) if len(used) else ():  # the borders before and after the minimum
+        border = np.clip(place + shift, 0, len(used) - 1)
         apart = np.abs(shares[rows, border + 1] - share) * length[rows]
         represented = (apart <= merged) | ((apart <= 0.5 * standing) & (bend * standing > _ROUND))
         keep[rows[represented], border[represented]] = False
@@ -84,7 +85,7 @@ def core_points(
     pairs, columns = np.nonzero(keep)
     return CorePoints(
         np.concatenate([rows[found], pairs]),
-        np.concatenate([np.zeros(int(found.sum()), dtype=np.intp), 1 + order[pairs, columns]]),
+        np.concatenate([np.zeros(int(found.sum()), dtype=np.intp), 1 + used[order[pairs, columns]]]),
         np.concatenate([starts[rows[found]] + share[found, None] * spans[rows[found]], points[pairs, columns + 1]]),
         np.concatenate([minimum[found], distances[pairs, columns + 1]]),
         np.concatenate([normal[found], normals[pairs, columns + 1]]),

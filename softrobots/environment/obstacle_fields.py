@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.environment.convex_mesh import Mesh, hull_of
 from softrobots.environment.distance_fields import Cylinders, Field, HalfSpaces, RoundedBoxes
 from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
@@ -24,6 +25,12 @@ def obstacle_fields(environment: Environment) -> list[tuple[Field, Any]]:
         numbers = np.array([i for i, one in enumerate(environment.obstacles) if isinstance(one, kinds)], dtype=np.intp)
         if len(numbers):
             fields.append((make([environment.obstacles[i] for i in numbers.tolist()], transforms[numbers]), numbers))
+    numbers = np.array([i for i, one in enumerate(environment.obstacles) if isinstance(one, Mesh)], dtype=np.intp)
+    if len(numbers):
+        from softrobots.environment.polyhedra import Polyhedra  # SciPy
+
+        hulls = [hull_of(environment.obstacles[i].vertices.tobytes()) for i in numbers.tolist()]
+        fields.append((Polyhedra(transforms[numbers, :3, :3], transforms[numbers, :3, 3], hulls), numbers))
     return fields
 
 

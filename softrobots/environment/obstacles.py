@@ -23,7 +23,7 @@ Pose = Callable[[float], Any]
 """A pose `transform_obstacle_to_world` of a parameter (time, stroke, ...): a `pinocchio.SE3` or an array, shape (4, 4)."""
 Kind = TypeVar("Kind", bound="Obstacle")
 
-_NO_TURN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+NO_TURN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _ROTATION_ERROR = 1e-9
 
 
@@ -201,7 +201,7 @@ class Box(Obstacle):
     """Length of its edges along its own x, y and z, shape (3,) [m]."""
     position: Any = (0.0, 0.0, 0.0)
     """Centre, world axes, shape (3,) [m]."""
-    rotation: Any = field(default=_NO_TURN, repr=False)
+    rotation: Any = field(default=NO_TURN, repr=False)
     """Its own axes as columns, shape (3, 3)."""
 
     kind: ClassVar[str] = "box"
@@ -223,7 +223,7 @@ class _Round(Obstacle):
     """Length along its own z axis [m]; of a capsule: of the straight part, between the centres of the round ends."""
     position: Any = (0.0, 0.0, 0.0)
     """Centre, world axes, shape (3,) [m]."""
-    rotation: Any = field(default=_NO_TURN, repr=False)
+    rotation: Any = field(default=NO_TURN, repr=False)
     """Its own axes as columns, shape (3, 3)."""
 
     def __post_init__(self) -> None:
