@@ -39,6 +39,9 @@ from softrobots.dynamics.ring_down import RingDown, ring_down
 from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.environment.capsule_error import capsule_error
+from softrobots.environment.convex_mesh import Mesh
+from softrobots.environment.environment import Environment
+from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
 from softrobots.identification.cross_validation import CrossValidation, cross_validate
 from softrobots.identification.identification import Identification
 from softrobots.identification.identify import identify
@@ -76,14 +79,19 @@ __all__ = [
     "PD",
     "ROBOTS",
     "AssumedStiffnessWarning",
+    "Box",
+    "Capsule",
     "ClosedLoop",
     "ClusterError",
     "CrossValidation",
+    "Cylinder",
     "DescriptionError",
+    "Environment",
     "Equilibrium",
     "EquilibriumBranch",
     "EquilibriumNotFound",
     "FileFormatError",
+    "HalfSpace",
     "HelixTube",
     "Identification",
     "IkSolution",
@@ -96,6 +104,7 @@ __all__ = [
     "LoadEstimate",
     "LoadNotFound",
     "Measurements",
+    "Mesh",
     "MissingDependency",
     "Motion",
     "MotionState",
@@ -115,6 +124,7 @@ __all__ = [
     "ShapedTrajectory",
     "SoftModel",
     "SoftRobotsError",
+    "Sphere",
     "SpringGroup",
     "Stability",
     "StraightTube",

@@ -78,6 +78,11 @@ PAGES = {
             *(f"softrobots.statics.contact.grasp.{name}" for name in ("ForceClosure", "PullOut")),
         ),
     ),
+    "environment": ApiPage(
+        "Environment",
+        "Obstacles that a robot touches.",
+        (*_top("Environment", "HalfSpace", "Sphere", "Box", "Cylinder", "Capsule", "Mesh"),),
+    ),
     "kinematics": ApiPage(
         "Inverse kinematics and paths",
         "Motors that put the loaded tip where it is wanted, along a path too, and what the tip reaches.",
