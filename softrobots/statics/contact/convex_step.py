@@ -19,7 +19,7 @@ from softrobots.statics.elastic_state import norm, positive, scaled
 _LEAST = 1e-3  # least curvature along which a step is taken, relative to the springs
 _TIGHT = {"primal_tol": 1e-13, "dual_tol": 1e-13}
 _FREE = 1e30  # bound that does not bind
-_SOLVED = 1  # exit flag of daqp
+_SOLVED, _EQUALITY = 1, 5  # exit flag and kind of constraint of daqp
 
 
 class Step(NamedTuple):
@@ -34,7 +34,14 @@ class Step(NamedTuple):
 
 
 def contact_step(
-    hessian: FloatArray, load: FloatArray, gaps: FloatArray, rows: FloatArray, held: Any, stiffness: FloatArray, factors: Any
+    hessian: FloatArray,
+    load: FloatArray,
+    gaps: FloatArray,
+    rows: FloatArray,
+    held: Any,
+    stiffness: FloatArray,
+    damping: float,
+    factors: Any,
 ) -> Step | None:
     """Solve the quadratic programme of a step; where gaps cannot be kept, the deepest penetration shrinks as far as it can.
 
@@ -45,6 +52,7 @@ def contact_step(
         rows: Their gradients, shape (m, n).
         held: Which are taken to be pressed, shape (m,), truth values; the Hessian is made positive beside them.
         stiffness: Stiffness of the springs, shape (n,).
+        damping: Stiffness that is added to shorten the step, relative to the springs.
         factors: An `eigenpy.LDLT` of size n.
 
     Returns:
@@ -53,7 +61,10 @@ def contact_step(
     soft = 1.0 / np.sqrt(stiffness)
     gradients = rows * soft
     pull = soft * load
-    convex, shift, exact = _convex(scaled(hessian, stiffness), gaps, gradients, held, factors)
+    relative = scaled(hessian, stiffness)
+    if damping:
+        relative = relative + damping * np.eye(len(soft))
+    convex, shift, exact = _convex(relative, gaps, gradients, held, factors)
     found = _solve(convex, pull + shift, gradients, -gaps)
     if found is not None and shift.any() and not np.array_equal(found[1] > 0.0, held):  # other contacts are pressed
         exact, found = False, _solve(convex, pull, gradients, -gaps)
@@ -61,24 +72,33 @@ def contact_step(
         exact, found = False, _least_penetration(convex, pull, gradients, gaps)
     if found is None or not np.isfinite(found[0]).all():
         return None
-    return Step(soft * found[0], found[1], exact)
+    return Step(soft * found[0], found[1], exact and damping == 0.0)
 
 
-def nearest_step(wanted: FloatArray, gaps: FloatArray, rows: FloatArray, stiffness: FloatArray) -> FloatArray | None:
-    """Return the step nearest to one that is wanted, in the measure of the springs, that keeps the linearised gaps."""
+def nearest_step(
+    wanted: FloatArray, gaps: FloatArray, rows: FloatArray, stiffness: FloatArray, closed: Any = None
+) -> FloatArray | None:
+    """Return the step nearest to one that is wanted, in the measure of the springs, that keeps the linearised gaps.
+
+    Those of `closed`, shape (m,), truth values, become zero; None if no step does that.
+    """
     soft = 1.0 / np.sqrt(stiffness)
-    found = _solve(np.eye(len(soft)), -wanted / soft, rows * soft, -gaps)
+    found = _solve(np.eye(len(soft)), -wanted / soft, rows * soft, -gaps, closed)
     return None if found is None else np.asarray(soft * found[0])
 
 
-def _solve(hessian: FloatArray, pull: FloatArray, gradients: FloatArray, bounds: FloatArray) -> tuple[FloatArray, ...] | None:
-    """Minimise `s^T H s / 2 + f^T s` with `A s >= b`; the solution and its multipliers, or None."""
+def _solve(
+    hessian: FloatArray, pull: FloatArray, gradients: FloatArray, bounds: FloatArray, equal: Any = None
+) -> tuple[FloatArray, ...] | None:
+    """Minimise `s^T H s / 2 + f^T s` with `A s >= b`, and `A s = b` in some rows; the solution and its multipliers, or None."""
     import daqp
 
     m = len(bounds)
     if m == 0:
         return np.asarray(np.linalg.solve(hessian, -pull)), np.zeros(0)
     above, sense = np.full(m, _FREE), np.zeros(m, dtype=np.int32)
+    if equal is not None:
+        above[equal], sense[equal] = bounds[equal], _EQUALITY
     matrices = (np.ascontiguousarray(one) for one in (hessian, pull, gradients))
     solution, _, flag, info = daqp.solve(*matrices, above, bounds, sense, **_TIGHT)
     return (np.array(solution), np.maximum(-np.array(info["lam"]), 0.0)) if flag == _SOLVED else None

@@ -19,7 +19,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import softest_motion
 from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step
-from softrobots.statics.contact.touch import ForceTable, Touch
+from softrobots.statics.contact.touch import TOUCHING, ForceTable, Touch
 from softrobots.statics.elastic_state import ElasticProblem, ElasticState, largest_residual, norm
 from softrobots.statics.stability import is_stable
 
@@ -27,6 +27,7 @@ _LARGEST_STEP = 0.5  # [rad], norm of one step; the linear model of a revolute c
 _ARMIJO = 1e-4  # share of the predicted decrease that a step must reach
 _SHORTEST = 1e-10  # share of a step below which it is not halved again
 _EXACT = 1e-12  # gap of a pressed contact that is zero, relative to the reach
+_LEAST_DAMPING, _MOST_DAMPING = 0.02, 100.0  # of steps that are too long or not good, relative to the springs
 _ESCAPE = 0.1  # [rad], step out of an unstable equilibrium
 
 
@@ -41,18 +42,20 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
     Returns:
         The last state, whether or not it is an equilibrium; the evaluations spent; and whether it is a stable equilibrium.
     """
-    state, spent, price = problem.state(start), 1, 0.0
+    state, spent, price, damping = problem.state(start), 1, 0.0, 0.0
     factors = LDLT(len(start))
-    while spent < most and state.touch is not None:
-        seek = _step if error_of(problem, state) > 1.0 else _way_out
-        step = seek(problem, state, state.touch, factors)
+    while spent < most and state.touch is not None and not _blocked(state.touch, problem.model.reach):
+        if error_of(problem, state) > 1.0:
+            step, damping = _step(problem, state, state.touch, damping, factors)
+        else:
+            step = _way_out(problem, state, state.touch)
         if step is None:
             break
         trial, used, price = _search(problem, state, state.touch, step, price, most - spent)
         spent += used
         if trial is None:
             break
-        state = trial
+        state, damping = trial, _LEAST_DAMPING + 4.0 * damping if used > 2 else 0.25 * damping
     return state, spent, is_stable(problem.model, problem.load, state, problem.tolerance)
 
 
@@ -66,22 +69,38 @@ def error_of(problem: ElasticProblem, state: ElasticState) -> float:
     return max(state.error / allowed, max(touch.penetration, open_gap) / (_EXACT * problem.model.reach))
 
 
-def _step(problem: ElasticProblem, state: ElasticState, touch: Touch, factors: LDLT) -> Step | None:
-    """Step of the quadratic programme, over the gaps that it can close."""
-    stiffness = problem.model.stiffness
+def _blocked(touch: Touch, reach: float) -> bool:
+    """Whether something penetrates that no spring moves."""
+    deep = touch.gaps.values < -TOUCHING * reach
+    return bool(deep.any()) and not touch.rows[deep].any(axis=1).all()
+
+
+def _step(
+    problem: ElasticProblem, state: ElasticState, touch: Touch, damping: float, factors: LDLT
+) -> tuple[Step | None, float]:
+    """Step of the quadratic programme over the gaps that it can close, damped until it is no longer than it may be.
+
+    Returns:
+        The step, and the damping.
+    """
+    stiffness, values = problem.model.stiffness, touch.gaps.values
     load = state.residual + touch.pushes
-    values = touch.gaps.values
     within = np.flatnonzero(values <= _LARGEST_STEP * np.linalg.norm(touch.rows, axis=1))
     held = touch.forces[within] > 0.0
-    found = contact_step(state.tangent, load, values[within], touch.rows[within], held, stiffness, factors)
+    damping = damping if damping >= _LEAST_DAMPING else 0.0
+    while True:
+        found = contact_step(state.tangent, load, values[within], touch.rows[within], held, stiffness, damping, factors)
+        if found is None or norm(found.step) <= _LARGEST_STEP or damping > _MOST_DAMPING:
+            break
+        damping = _LEAST_DAMPING + 4.0 * damping
     if found is None:
-        return None
+        return None, damping
     forces = np.zeros(len(values))
     forces[within] = found.forces
-    return found._replace(forces=forces)
+    return found._replace(forces=forces), damping
 
 
-def _way_out(problem: ElasticProblem, state: ElasticState, touch: Touch, factors: LDLT) -> Step | None:
+def _way_out(problem: ElasticProblem, state: ElasticState, touch: Touch) -> Step | None:
     """Step out of an unstable equilibrium along its softest motion that the contacts leave; None at any other.
 
     Of two signs that are free the one with the positive largest component is taken, so that results repeat.
@@ -98,6 +117,11 @@ def _way_out(problem: ElasticProblem, state: ElasticState, touch: Touch, factors
         if step is not None and float(step @ state.tangent @ step) < 0.0 and norm(step) > 0.1 * norm(wanted):
             return Step(step, touch.forces, False)
     return None
+
+
+def _back_to_surface(touch: Touch, stiffness: FloatArray) -> FloatArray | None:
+    """Shortest step that closes the gaps with a force and opens penetrations."""
+    return nearest_step(np.zeros(len(stiffness)), touch.gaps.values, touch.rows, stiffness, touch.forces > 0.0)
 
 
 def _search(
@@ -138,7 +162,7 @@ def _search(
         if better(trial, share):
             return trial, spent, price
         if share == 1.0 and trial.touch is not None and spent < most:
-            back = nearest_step(np.zeros_like(whole), trial.touch.gaps.values, trial.touch.rows, problem.model.stiffness)
+            back = _back_to_surface(trial.touch, problem.model.stiffness)
             if back is not None and norm(back) <= norm(whole):
                 trial = problem.state(trial.q_springs + back, table)
                 spent += 1

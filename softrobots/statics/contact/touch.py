@@ -140,10 +140,10 @@ def _nonnegative(gradients: FloatArray, load: FloatArray) -> FloatArray:
 
 
 def deepest_penetration(touch: Touch) -> str:
-    """Return what penetrates most, in words."""
-    place = int(touch.gaps.values.argmin())
+    """Return what penetrates most, in words; rather what no spring moves."""
+    depths = np.maximum(-touch.gaps.values, 0.0)
+    fixed = depths * ~touch.rows.any(axis=1)
+    place = int((fixed if fixed.any() else depths).argmax())
     link, other, _ = touch.pair(place)
-    words = f"{link!r} is {-touch.gaps.values[place]:.3g} m inside of {other!r}"
-    if not touch.rows[place].any():
-        words += ", wherever the springs are: move the motors or the obstacle"
-    return words
+    advice = ", wherever the springs are: move the motors or the obstacle" if fixed.any() else ""
+    return f"{link!r} is {depths[place]:.3g} m inside of {other!r}{advice}"
