@@ -10,8 +10,8 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import softrobots as sr
-from softrobots.environment.environment import Environment
-from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
+from softrobots import Box, Capsule, Cylinder, Environment, HalfSpace, Mesh, Sphere
+from softrobots.environment.obstacles import Obstacle
 from softrobots.statics.contact.contact import Contact
 from softrobots.view.figures.loaded_robot import loaded_shape
 from softrobots.view.mesh_triangles import triangles
@@ -24,6 +24,8 @@ TURN = Rotation.from_euler("xyz", (0.4, -0.7, 1.1)).as_matrix()
 PLACE = np.array((0.5, -0.2, 0.3))
 MOVE = np.eye(4)
 MOVE[:3, :3], MOVE[:3, 3] = Rotation.from_euler("zyx", (0.3, 0.2, -0.5)).as_matrix(), (0.1, 0.2, -0.1)
+CORNERS = np.array([(x, y, z) for x in (-0.05, 0.05) for y in (-0.1, 0.1) for z in (-0.2, 0.2)])
+"""Corners of the box, as a mesh, shape (8, 3) [m]."""
 ROUND = 1.0 - np.cos(np.pi / 16.0)
 """Share of a radius by which a polygon of 16 corners or more is inside of its circle, in one direction."""
 
@@ -40,11 +42,12 @@ def corners_of(obstacle: Obstacle, ground: float = -np.inf) -> np.ndarray:
     ("obstacle", "reach", "error"),
     [  # farthest distance from the centre along a direction in the obstacle's own axes, in closed form
         (Box((0.1, 0.2, 0.4), PLACE, TURN), lambda u: np.abs(u) @ (0.05, 0.1, 0.2), 1e-12),
+        (Mesh(CORNERS, PLACE, TURN), lambda u: np.abs(u) @ (0.05, 0.1, 0.2), 1e-12),
         (Sphere(0.25, PLACE), lambda u: 0.25 * np.linalg.norm(u), 2 * 0.25 * ROUND),
         (Cylinder(0.1, 0.4, PLACE, TURN), lambda u: 0.1 * np.hypot(u[0], u[1]) + 0.2 * abs(u[2]), 0.1 * ROUND),
         (Capsule(0.1, 0.4, PLACE, TURN), lambda u: 0.1 * np.linalg.norm(u) + 0.2 * abs(u[2]), 2 * 0.1 * ROUND),
     ],
-    ids=["box", "sphere", "cylinder", "capsule"],
+    ids=["box", "mesh", "sphere", "cylinder", "capsule"],
 )
 def test_a_solid_is_drawn_where_the_obstacle_is(
     obstacle: Obstacle, reach: object, error: float, pose: np.ndarray | None, rng: np.random.Generator

@@ -76,6 +76,21 @@ def test_what_is_shown_is_the_equilibrium_of_what_is_set(arm: sr.SoftModel) -> N
         assert f"link 2: {100 * left:.0f} %" in panel_html(page)
 
 
+def test_an_arm_leans_on_the_obstacles_that_are_given(arm: sr.SoftModel) -> None:
+    """A wall at 1 m stops the tip where its link of 55 mm touches; without the load nothing touches."""
+    wall = sr.Environment([sr.HalfSpace((-1, 0, 0), offset=-1.0, name="wall")])
+    with SliderPage(arm, q_motors=(0.0, 0.9, -0.4), full_force=30.0, environment=wall) as page:
+        assert {"obstacles/0"} == {name for name in page._drawing.handles if name.startswith(("obstacles", "contacts"))}
+        leaning = page.set(force=(0, 0, -20))
+        assert leaning.tip_position[0] == pytest.approx(0.945, abs=1e-9)
+        (contact,) = leaning.contacts
+        assert f"wall pushes with {contact.normal_force:.3g} N" in panel_html(page)
+        drawn = page._drawing.handles[f"contacts/{contact.link}/wall/0"]
+        assert np.allclose(drawn.position, contact.point, atol=1e-6)
+        assert page.set(force=(0, 0, 0)).contacts == ()
+        assert "wall pushes" not in panel_html(page)
+
+
 def test_muscles_and_robots_without_motors() -> None:
     pcc = sr.load_model(sr.PccArm())
     with SliderPage(pcc, q_motors=HELD) as page:

@@ -318,6 +318,7 @@ def test_sliders_begin_with_the_loaded_robot(monkeypatch: pytest.MonkeyPatch, ca
     words = "view inflatable_arm --sliders --motors 0 0.5 -0.5 --force 0 0 -3 --gravity --port 8123"
     assert main(words.split()) == 0
     options = {"q_motors": [0.0, 0.5, -0.5], "force": [0.0, 0.0, -3.0], "gravity": [0.0, 0.0, -9.81], "port": 8123}
+    options |= {"environment": None}
     assert calls == [("inflatable_arm", options), "closed"]
     assert "serving http://127.0.0.1:8123/ (Ctrl-C ends)" in capsys.readouterr().out
 

@@ -211,6 +211,7 @@ def _slide(arguments: argparse.Namespace, equilibrium: Equilibrium) -> None:
         q_motors=equilibrium.q_motors,
         force=tip_force(equilibrium),
         gravity=equilibrium.load.gravity,
+        environment=equilibrium.load.environment,
         port=arguments.port,
     ) as page:
         _serve(arguments, page, state_line(equilibrium))

@@ -10,6 +10,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, positive_number
 from softrobots.core.errors import NeutralEquilibrium, NotConverged, ParameterError, ViewerError
+from softrobots.environment.environment import Environment
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
@@ -45,6 +46,7 @@ class SliderPage(ServedPage):
         gravity: Any = None,
         port: int | None = None,
         full_force: float | None = None,
+        environment: Environment | None = None,
     ) -> None:
         """Solve the start, then start a server in threads of this process and draw it.
 
@@ -57,6 +59,7 @@ class SliderPage(ServedPage):
             port: Port of the page; the first free one from 8080 by default.
             full_force: Largest force of each slider, to both sides [N]; by default a round number that bends the robot
                 visibly, or the largest component of `force` if that is more.
+            environment: Obstacles that the robot touches without friction; None: free space.
 
         Raises:
             ParameterError: If an argument has the wrong shape, is not finite or out of range.
@@ -68,6 +71,7 @@ class SliderPage(ServedPage):
         motors = model.relaxed_motors if q_motors is None else q_motors
         push = finite_array("force", (0.0, 0.0, 0.0) if force is None else force, (3,), "N")
         self._gravity = finite_array("gravity", EARTH_GRAVITY if gravity is None else gravity, (3,), "m/s^2")
+        self._environment = environment
         self._full = _visible_force(model) if full_force is None else positive_number("full_force", full_force, "N")
         if full_force is None:
             self._full = max(self._full, float(np.abs(push).max()))
@@ -177,7 +181,8 @@ class SliderPage(ServedPage):
     def _solve_from_rest(self, setting: Setting) -> Equilibrium:
         """Solve from relaxed springs."""
         gravity = self._gravity if setting.gravity else None
-        return solve_equilibrium(self._model, setting.q_motors, setting.force, gravity=gravity)
+        obstacles = self._environment
+        return solve_equilibrium(self._model, setting.q_motors, setting.force, gravity=gravity, environment=obstacles)
 
     def _read_scene(self) -> None:
         """Take the scene of a new equilibrium."""

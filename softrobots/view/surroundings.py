@@ -89,7 +89,7 @@ def _solid(obstacle: Any, centre: FloatArray, size: float, ground: float) -> tup
 
             solid = capsule(height=obstacle.length, radius=obstacle.radius, count=_ROUND)
             return Triangles(np.array(solid.vertices), np.array(solid.faces)), pose
-    return Triangles(np.array(obstacle.vertices), np.array(obstacle.faces)), pose
+    return Triangles(np.array(obstacle.vertices), np.array(obstacle.triangles)), pose
 
 
 def _sheet(wall: HalfSpace, centre: FloatArray, size: float, ground: float) -> tuple[Any, FloatArray]:

@@ -14,7 +14,7 @@ _STARTS = 6  # searches when that from the last coordinates fails: few, for a qu
 
 
 def next_equilibrium(last: Equilibrium, q_motors: Any, force: Any = None, *, gravity: Any = None) -> Equilibrium:
-    """Solve an equilibrium starting from another one; a robot that has snapped through stays on its branch.
+    """Solve an equilibrium from another one, among its obstacles; a robot that has snapped through stays on its branch.
 
     Args:
         last: The equilibrium to start from.
@@ -30,13 +30,13 @@ def next_equilibrium(last: Equilibrium, q_motors: Any, force: Any = None, *, gra
         EquilibriumNotFound: If there is none from relaxed springs either.
     """
     model = last.model
-    motors = model.checked_motors(q_motors)
+    motors, obstacles = model.checked_motors(q_motors), last.load.environment
     if model.coordinates.at(motors, last.q_springs).valid:
         try:
-            return solve_equilibrium(model, motors, force, gravity=gravity, q_springs0=last.q_springs)
+            return solve_equilibrium(model, motors, force, gravity=gravity, q_springs0=last.q_springs, environment=obstacles)
         except EquilibriumNotFound:
             pass
-    return solve_equilibrium(model, motors, force, gravity=gravity)
+    return solve_equilibrium(model, motors, force, gravity=gravity, environment=obstacles)
 
 
 def next_solution(last: Equilibrium, target: Any, force: Any = None, *, gravity: Any = None) -> IkSolution:
