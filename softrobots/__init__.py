@@ -57,6 +57,7 @@ from softrobots.robots.growth import grown_coordinates
 from softrobots.statics.buckling.critical_load import critical_load
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.buckling.post_buckling import post_buckling_branches
+from softrobots.statics.contact.contact_sensitivity import contact_sensitivity
 from softrobots.statics.contact.grasp import contact_wrench, is_force_closure, pull_out_force
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
@@ -139,6 +140,7 @@ __all__ = [
     "capsule_error",
     "compliance",
     "constant_curvature",
+    "contact_sensitivity",
     "contact_wrench",
     "critical_load",
     "cross_validate",

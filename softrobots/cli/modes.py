@@ -82,6 +82,7 @@ def run(arguments: argparse.Namespace) -> None:
         servo_stiffness=servos,
     )
     files = save(arguments, modes) + write_plot(arguments, lambda: mode_shapes(modes, shown=arguments.count))
+    pages = pages[: len(modes.frequencies)]
     if pages:
         with Viewer(model) as viewer:
             for mode, page in enumerate(pages, start=1):

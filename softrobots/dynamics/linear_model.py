@@ -19,6 +19,7 @@ from softrobots.dynamics.small_motion import SmallMotion, mass_factor, small_mot
 from softrobots.model.actuators import load_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
+from softrobots.statics.loads import check_no_contact
 
 _GIVEN = {"N": "tension", "m": "motor", "Pa": "pressure"}  # what actuators of free length are given, by its unit
 _TIP = ("tip_x", "tip_y", "tip_z", "tip_turn_x", "tip_turn_y", "tip_turn_z")
@@ -107,11 +108,12 @@ def linearize(
         The linear model.
 
     Raises:
-        ParameterError: If an argument is out of range, the equilibrium belongs to another model, or torques are to drive
-            muscles whose lengths depend on each other.
+        ParameterError: If an argument is out of range, the equilibrium belongs to another model or has obstacles, or torques
+            are to drive muscles whose lengths depend on each other.
         DescriptionError: If the description has no masses, or the robot more joints than Pinocchio supports.
     """
     check_same_model(model, equilibrium)
+    check_no_contact(equilibrium, "a linear model of motion (vibration_modes takes them)")
     driven = choice("motors", motors, MOTORS) == "torque"
     if driven and not model.actuators.independent:
         raise ParameterError("motors", motors, "'prescribed': more than three muscles of a segment have no independent lengths")

@@ -6,8 +6,8 @@ The coordinates are those of the actuators that have a place (motor joints, musc
 
 .. math:: M \ddot x + D \dot x + K \, \delta x = \begin{pmatrix} \delta\tau \\ 0 \end{pmatrix} + J^T \delta f
 
-`K` is exact: springs, and the geometric stiffness of load and gravity. Coriolis and centrifugal terms are of second order about
-rest. Under a world-fixed moment `K` is not symmetric.
+`K` is exact: springs, and the geometric stiffness of load, gravity and contact forces. Coriolis and centrifugal terms are of
+second order about rest. Under a world-fixed moment `K` is not symmetric.
 """
 
 from __future__ import annotations
@@ -22,6 +22,7 @@ from softrobots.core.errors import DescriptionError
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.contact.pressed_gaps import pressed_gaps, state_in_contact, whole_stiffness
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import frame_jacobian
 
@@ -43,6 +44,8 @@ class SmallMotion(NamedTuple):
     """Geometric Jacobian of the tip, world axes, linear rows first, shape (6, n)."""
     momentum: FloatArray
     """Momentum, and angular momentum about the world's origin, by rates of the coordinates, shape (6, n) [kg m, kg m^2]."""
+    pressed: FloatArray | None = None
+    """Derivatives of the gaps that stay closed by the coordinates, shape (k, n); None if nothing is pressed."""
 
 
 def small_motion(
@@ -58,7 +61,7 @@ def small_motion(
         rotor_inertia: Inertia of the rotor of each placed actuator, or one for all [kg m^2 or kg]; None: of the file.
 
     Raises:
-        ParameterError: If a number is negative or not finite, or a shape differs.
+        ParameterError: If a number is negative or not finite, a shape differs, or contacts have friction.
         DescriptionError: If the robot has more joints than Pinocchio supports.
     """
     m, placed, drives = model.n_motors, model.actuators.n_placed, model.actuators.drives
@@ -67,7 +70,13 @@ def small_motion(
         drives = drives._replace(rotor_inertia=np.pad(given, (0, m - placed)))
     load, x = equilibrium.load, np.concatenate([equilibrium.q_motors, equilibrium.q_springs])
     equations = EquationsOfMotion(model, load.gravity, drives=drives)
-    point, whole, stiffness = equations.point(x), equations.mass_matrix(x), equations.stiffness(x, load.wrenches)
+    point, whole = equations.point(x), equations.mass_matrix(x)
+    pressed = None
+    if load.environment is None:
+        stiffness = equations.stiffness(x, load.wrenches)
+    else:
+        state = state_in_contact(equilibrium, "a vibration")
+        stiffness, pressed = whole_stiffness(state, load), pressed_gaps(state)
     damping = equations.damping.copy()
     damping[m:, m:] = damping_matrix(model, damping_time, mass_damping, whole[m:, m:])
     kept = np.r_[:placed, m : len(x)]
@@ -83,6 +92,7 @@ def small_motion(
         by_tension=-stiffness[kept, placed:m],
         tip=columns(frame_jacobian(model, equilibrium.q, model.tip)),
         momentum=columns(_momentum(model, equilibrium.q)),
+        pressed=None if pressed is None else np.concatenate([pressed.by_motors, pressed.by_springs], axis=1)[:, kept],
     )
 
 

@@ -13,6 +13,7 @@ from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.time_inputs import MotorPath
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.loads import check_no_contact
 
 _APART = 1e-6  # largest distance of motors from where the start has them [rad or m]
 
@@ -21,7 +22,7 @@ def first_state(model: SoftModel, start: Any, path: MotorPath, free: int = 0) ->
     """Return the state at time zero; the first `free` actuators are where `start` has them, the others where the path begins.
 
     Raises:
-        ParameterError: If `start` is of another kind or robot, or has the actuators elsewhere.
+        ParameterError: If `start` is of another kind or robot, has obstacles, or has the actuators elsewhere.
     """
     motors, springs, rates = path(0.0), model.rest, np.zeros(model.n_motors + model.n_springs)
     if start is not None:
@@ -29,6 +30,8 @@ def first_state(model: SoftModel, start: Any, path: MotorPath, free: int = 0) ->
             start = start.end
         if not isinstance(start, Equilibrium | MotionState):
             raise ParameterError("start", start, "an Equilibrium, a Motion, a MotionState, or None (relaxed, at rest)")
+        if isinstance(start, Equilibrium):
+            check_no_contact(start, "a simulation (export the robot with its obstacles to MuJoCo or Drake)")
         if start.model != model:
             raise ParameterError("start", start.model, f"a state of the model given, {model!r}")
         apart = np.abs(motors - start.q_motors)[free : model.actuators.n_placed].max(initial=0.0)

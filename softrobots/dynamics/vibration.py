@@ -11,6 +11,9 @@ Damping `D` does not change the modes: with :math:`d_{ij} = \phi_i^T D \phi_j` t
 d_{ii} / 2 \omega_i`. That is exact if damping does not couple the modes (a `damping_time` without load, `mass_damping` always),
 and wrong by terms of second order in the coupling otherwise (Rayleigh, The Theory of Sound, 1894, section 102);
 `VibrationModes.eigenvalues` are exact for any damping.
+
+In contact the robot vibrates along its obstacles, without friction: `K` is the Hessian of the Lagrangian, and the modes are
+those of :math:`Z^T K Z` and :math:`Z^T M Z`, with a basis `Z` of the motions that keep the pressed gaps closed.
 """
 
 from __future__ import annotations
@@ -28,6 +31,7 @@ from softrobots.core.errors import NeutralEquilibrium, ParameterError
 from softrobots.dynamics.small_motion import mass_factor, small_motion
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
+from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_placement
@@ -48,7 +52,7 @@ class VibrationModes:
     equilibrium: Equilibrium
     """The equilibrium."""
     frequencies: FloatArray
-    """Natural frequencies without damping, ascending, shape (n,) [Hz]."""
+    """Natural frequencies without damping, ascending, shape (n,) [Hz]; one less for each pressed contact."""
     shapes: FloatArray
     r"""Elastic coordinates of each mode per modal coordinate, a column a mode, mass-normalised, shape (n_springs, n)
     [rad/(sqrt(kg) m) or 1/sqrt(kg)]."""
@@ -91,7 +95,7 @@ class VibrationModes:
         mode.
         """
         omega, n = 2.0 * math.pi * self.frequencies, len(self.frequencies)
-        modes = np.concatenate([self.motor_shapes[: n - len(self.shapes)], self.shapes])
+        modes = np.concatenate([self.motor_shapes[: len(self.mass_matrix) - len(self.shapes)], self.shapes])
         state = np.block([[np.zeros((n, n)), np.diag(omega)], [-np.diag(omega), -modes.T @ self.damping_matrix @ modes]])
         with one_blas_thread(2 * n):
             values: Any = np.linalg.eigvals(state)
@@ -171,7 +175,8 @@ def vibration_modes(
     """Find the natural frequencies, shapes and damping ratios of a robot about a stable equilibrium under any load.
 
     Stiffness is the exact tangent with load and gravity, and the mass matrix that of the bent shape. The load does not change
-    while the robot vibrates.
+    while the robot vibrates. In contact, pressed contacts stay pressed and slide without friction, so that there are as many
+    modes less; where the robot touches without a force, nothing holds it.
 
     Args:
         model: The robot.
@@ -189,7 +194,8 @@ def vibration_modes(
 
     Raises:
         ParameterError: If an argument is out of range, the equilibrium belongs to another model, its load has a moment (under
-            which modes are not orthogonal; `linearize` takes it), or it is unstable, with its servos.
+            which modes are not orthogonal; `linearize` takes it), its contacts have friction, or it is unstable, with its
+            servos.
         NeutralEquilibrium: If the stiffness is singular.
         DescriptionError: If the description has no masses, or the robot more joints than Pinocchio supports.
     """
@@ -213,8 +219,16 @@ def vibration_modes(
     with one_blas_thread(len(mass)):
         stiffness = (small.stiffness + np.diag(np.concatenate([servos, np.zeros(model.n_springs)])))[first:, first:]
         stiffness = 0.5 * (stiffness + stiffness.T)
-        _refuse_unstable(model, stiffness, servos[first:])
-        frequencies, modes = _modes(stiffness, mass, model)
+        own = np.concatenate([np.where(servos[first:] > 0.0, servos[first:], model.stiffest or 1.0), model.stiffness])
+        if small.pressed is None:
+            _refuse_unstable(scaled(stiffness, own))
+            frequencies, modes = _modes(stiffness, mass, model)
+        else:  # only motions that keep the gaps closed
+            soft = 1.0 / np.sqrt(own)
+            free = soft[:, None] * null_space(small.pressed[:, first:] * soft)
+            _refuse_unstable(free.T @ stiffness @ free)
+            frequencies, modes = _modes(free.T @ stiffness @ free, free.T @ mass @ free, model)
+            modes = free @ modes
         modes = _signed(model, tip, frequencies, modes)
     motors = np.zeros((model.n_motors, len(frequencies)))
     motors[: small.n_placed - first] = modes[: small.n_placed - first]
@@ -239,10 +253,9 @@ def vibration_modes(
     )
 
 
-def _refuse_unstable(model: SoftModel, stiffness: FloatArray, servos: FloatArray) -> None:
-    """Refuse a stiffness that is not positive definite in coordinates in which springs and servos have stiffness 1."""
-    own = np.concatenate([np.where(servos > 0.0, servos, model.stiffest or 1.0), model.stiffness])
-    softest = float(np.linalg.eigvalsh(scaled(stiffness, own)).min(initial=1.0))
+def _refuse_unstable(relative: FloatArray) -> None:
+    """Refuse a stiffness that is not positive definite, in coordinates in which springs and servos have stiffness 1."""
+    softest = float(np.linalg.eigvalsh(relative).min(initial=1.0))
     if softest <= -POSITIVE:
         required = "positive, relative to springs and servos: about an unstable one nothing vibrates (linearize takes it)"
         raise ParameterError("least stiffness of the equilibrium", float(f"{softest:.3g}"), required)

@@ -23,6 +23,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.load_estimation import LoadEstimate
+from softrobots.statics.loads import check_no_contact
 from softrobots.statics.tip_force.force_search import OBSERVABLE
 
 
@@ -241,14 +242,15 @@ def sensitivity(
         The derivatives. They are cheap to compute and are not saved.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model, its robot has friction of guides, or friction of segments
-            whose muscle lengths are given, a name is that of several parts whose values differ, or the structure of the robot
-            changes with a parameter.
+        ParameterError: If the equilibrium belongs to another model or has obstacles, its robot has friction of guides,
+            or friction of segments whose muscle lengths are given, a name is that of several parts whose values differ,
+            or the structure of the robot changes with a parameter.
         NameNotFound: If there is no such parameter; with all that there are.
         NeutralEquilibrium: If the tangent stiffness is singular: a neutral equilibrium has no derivative.
     """
     estimate, at = (equilibrium, equilibrium.equilibrium) if isinstance(equilibrium, LoadEstimate) else (None, equilibrium)
     check_same_model(model, at)
+    check_no_contact(at, "a derivative by parameters")
     friction = model.structure.friction
     if friction is not None and (friction.guided or model.structure.muscle_lengths is not None):
         requirement = "a robot without friction of guides, and without friction of segments whose muscle lengths are given"

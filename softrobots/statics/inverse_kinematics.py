@@ -13,6 +13,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, choice, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
+from softrobots.environment.environment import Environment
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import ElasticState
 from softrobots.statics.elastostatics import METHODS, solve_springs
@@ -78,6 +79,7 @@ def solve_ik(
     method: str = "newton",
     tolerance: float = POSITION_TOLERANCE,
     starts: int = 24,
+    environment: Environment | None = None,
 ) -> IkSolution:
     """Find actuator coordinates (motor angles, muscle lengths) that put the loaded tip at a target position.
 
@@ -105,6 +107,7 @@ def solve_ik(
         method: Solver of the springs, "newton" or "fixed_point".
         tolerance: Largest distance of the tip from the target [m].
         starts: Number of searches, the one from `q_motors0` included.
+        environment: Obstacles that the robot may lean on without friction, only with "newton"; None: free space.
 
     Returns:
         The solution.
@@ -118,8 +121,8 @@ def solve_ik(
     """
     check_model(model)
     goal = Goal.of(target, orientation)
-    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
-    choice("method", method, METHODS)
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity, environment=environment)
+    choice("method", method, METHODS if environment is None else METHODS[:1])
     if elbow is not None:
         choice("elbow", elbow, ELBOWS)
     positive_number("tolerance", tolerance, "m")

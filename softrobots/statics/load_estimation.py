@@ -18,6 +18,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, read_only
 from softrobots.core.errors import LoadNotFound, ParameterError
 from softrobots.core.result_file import text
+from softrobots.environment.environment import Environment
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state
@@ -97,6 +98,7 @@ def estimate_load(
     motor_angle_std: Any = None,
     restart: bool = True,
     max_iterations: int | None = None,
+    environment: Environment | None = None,
 ) -> LoadEstimate:
     r"""Find the force at the tip from motor coordinates and torques.
 
@@ -132,6 +134,8 @@ def estimate_load(
             covariance.
         restart: Whether "newton" starts again from other forces; it takes some ten times as long.
         max_iterations: Most steps of a search; 100 for "newton", 1000 for "alternation" by default.
+        environment: Obstacles that the robot leans on without friction, whose forces the motors feel, too: they are in
+            `equilibrium.contacts` of the result, and the force is what acts beside them. Not for "alternation".
 
     Returns:
         The force with conditioning, unobservable directions, covariance and alternatives.
@@ -154,7 +158,8 @@ def estimate_load(
     span = _span(directions)
     if method == "alternation" and directions is not None:
         raise ParameterError("directions", directions, "None for 'alternation', which finds forces of any direction")
-    base = Load.of(model, frame=at, gravity=gravity)
+    choice("method", method, METHODS if environment is None else METHODS[:1])
+    base = Load.of(model, frame=at, gravity=gravity, environment=environment)
     most = 100 if method == "newton" else 1000
     most = most if max_iterations is None else positive_integer("max_iterations", max_iterations)
     problem = MeasuredTorques(model, motors, torques, base, at, errors, span)

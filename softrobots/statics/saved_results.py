@@ -18,11 +18,13 @@ from softrobots.core.checks import FloatArray, choice, finite_array, finite_numb
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
+from softrobots.environment.environment import Environment
 from softrobots.model.dry_friction import FrictionMemory
 from softrobots.model.friction_coordinates import memory_of, remembering
 from softrobots.model.loader import load_again, load_arguments
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
+from softrobots.statics.contact.touch import TOUCHING
 from softrobots.statics.displacement_control import DisplacementControl, Probe
 from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
 from softrobots.statics.elastostatics import METHODS
@@ -44,7 +46,8 @@ _SOLVERS = (*METHODS, *(name for name in ESTIMATIONS if name not in METHODS))
 def pack_model(model: SoftModel, load: Load) -> dict[str, Any]:
     """Return the named texts that hold a robot and a load in a result file."""
     wrenches = {name: wrench.tolist() for name, wrench in load.wrenches.items()}
-    load_text = json.dumps({"wrenches": wrenches, "gravity": load.gravity})
+    obstacles = {} if load.environment is None else {"environment": load.environment.to_dict()}
+    load_text = json.dumps({"wrenches": wrenches, "gravity": load.gravity} | obstacles)
     return {"urdf": model.urdf, "model": json.dumps(load_arguments(model)), "load": load_text}
 
 
@@ -61,7 +64,8 @@ def unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
     springs = {str(name): (float(k), float(rest)) for name, (k, rest) in arguments["springs"].items()}
     muscles = arguments.get("muscles", "lengths")
     model = load_again(urdf, springs=springs, motors=arguments["motors"], tip=arguments["tip"], muscles=muscles)
-    return model, Load.of(model, wrench=load["wrenches"], gravity=load["gravity"])
+    environment = Environment.from_dict(load["environment"]) if "environment" in load else None
+    return model, Load.of(model, wrench=load["wrenches"], gravity=load["gravity"], environment=environment)
 
 
 def _pack_rows(equilibria: tuple[Equilibrium, ...], *, one_load: bool = True) -> dict[str, Any]:
@@ -101,6 +105,9 @@ def _unpack_rows(fields: Mapping[str, Any], forces: FloatArray | None = None, fr
             raise FileFormatError(
                 f"its row {row} claims a residual of {residual[row]:.3g} N m, but it is {found.residual:.3g} N m"
             )
+        deepest = min((contact.gap for contact in found.contacts), default=0.0)
+        if deepest < -TOUCHING * model.reach:
+            raise FileFormatError(f"its row {row} is {-deepest:.3g} m inside of an obstacle")
         equilibria.append(replace(found, tolerance=float(tolerance[row])))
     return tuple(equilibria)
 
@@ -206,7 +213,8 @@ def _table(trajectory: Trajectory) -> dict[str, FloatArray]:
         while name in columns or name in last:
             name = f"joint_{name}"
         columns[name] = column
-    return columns | last
+    forces = {f"force on {name} [N]": force for name, force in trajectory.contact_forces.items()}
+    return columns | last | forces
 
 
 def _pack_workspace(workspace: Workspace) -> dict[str, Any]:

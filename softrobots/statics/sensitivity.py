@@ -1,4 +1,7 @@
-"""First derivatives of a loaded equilibrium: elastostatic Jacobian and compliance."""
+"""First derivatives of a loaded equilibrium: elastostatic Jacobian and compliance.
+
+In contact they are those while every pressed contact stays pressed, without friction.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
+from softrobots.statics.contact.pressed_gaps import PressedGaps, pressed_gaps, state_in_contact
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_jacobian
@@ -32,12 +36,13 @@ def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatAr
         Shape (3, n_motors) [m/rad or m/m], world axes.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model.
+        ParameterError: If the equilibrium belongs to another model, or has contacts with friction.
         NeutralEquilibrium: If its tangent stiffness is singular, see `inverse_stiffness`.
     """
     check_same_model(model, equilibrium)
     motors, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
-    return tip_motion(model, motors[:3], springs[:3], equilibrium.tangent_stiffness, equilibrium.coupling)[0]
+    matrices = equilibrium.tangent_stiffness, equilibrium.coupling, _pressed(equilibrium)
+    return tip_motion(model, motors[:3], springs[:3], *matrices)[0]
 
 
 def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
@@ -54,12 +59,24 @@ def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
         Shape (6, 6) [m/N, m/(N m); rad/N, rad/(N m)].
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model.
+        ParameterError: If the equilibrium belongs to another model, or has contacts with friction.
         NeutralEquilibrium: If its tangent stiffness is singular, see `inverse_stiffness`.
     """
     check_same_model(model, equilibrium)
     _, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
-    return np.asarray(springs @ inverse_stiffness(model, equilibrium.tangent_stiffness) @ springs.T)
+    tangent, pressed = equilibrium.tangent_stiffness, _pressed(equilibrium)
+    if pressed is None:
+        inverse = inverse_stiffness(model, tangent)
+    else:
+        inverse = inverse_in_contact(model, tangent, pressed.by_springs).springs_by_load
+    return np.asarray(springs @ inverse @ springs.T)
+
+
+def _pressed(equilibrium: Equilibrium) -> PressedGaps | None:
+    """The pressed gaps of an equilibrium, or ParameterError if its contacts have friction."""
+    if not equilibrium.contacts:
+        return None
+    return pressed_gaps(state_in_contact(equilibrium, "a derivative"))
 
 
 def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -72,7 +89,12 @@ def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -
 
 
 def tip_motion(
-    model: SoftModel, motors: FloatArray, springs: FloatArray, tangent: FloatArray, coupling: FloatArray
+    model: SoftModel,
+    motors: FloatArray,
+    springs: FloatArray,
+    tangent: FloatArray,
+    coupling: FloatArray,
+    pressed: PressedGaps | None = None,
 ) -> tuple[FloatArray, FloatArray]:
     """Derivatives of tip and springs by the motors at constant load, from matrices at an equilibrium.
 
@@ -82,6 +104,7 @@ def tip_motion(
         springs: The same rows, columns per elastic coordinate, shape (m, n_springs).
         tangent: Tangent stiffness, shape (n_springs, n_springs).
         coupling: Derivative of the elastic load with respect to the actuators, shape (n_springs, n_motors).
+        pressed: The gaps that stay zero; None without any.
 
     Returns:
         `dx/dq_m`, shape (m, n_motors), and `dy/dq_m`, shape (n_springs, n_motors). Of a load with a potential, the first one,
@@ -90,8 +113,35 @@ def tip_motion(
     Raises:
         NeutralEquilibrium: If the tangent stiffness is singular.
     """
-    follow = inverse_stiffness(model, tangent) @ coupling
+    follow, _ = held_motion(model, tangent, coupling, pressed)
     return motors + springs @ follow, follow
+
+
+def held_motion(
+    model: SoftModel, tangent: FloatArray, coupling: FloatArray, pressed: PressedGaps | None
+) -> tuple[FloatArray, FloatArray]:
+    """Derivatives of the springs by the motors, and of the motor loads through springs and contact forces.
+
+    Args:
+        model: The robot.
+        tangent: Tangent stiffness, shape (n_springs, n_springs).
+        coupling: Derivative of the elastic load with respect to the actuators, shape (n_springs, n_motors).
+        pressed: The gaps that stay zero; None without any.
+
+    Returns:
+        `dy/dq_m`, shape (n_springs, n_motors); and, of a load with a potential, what `d tau_m/dq_m` has beside its value at
+        constant springs and contact forces, shape (n_motors, n_motors).
+
+    Raises:
+        NeutralEquilibrium: If the stiffness is singular.
+    """
+    if pressed is None:
+        follow = inverse_stiffness(model, tangent) @ coupling
+        return follow, coupling.T @ follow
+    inverse = inverse_in_contact(model, tangent, pressed.by_springs)
+    follow = inverse.springs_by_load @ coupling - inverse.springs_by_gap @ pressed.by_motors
+    forces = inverse.forces_by_load @ coupling - inverse.forces_by_gap @ pressed.by_motors
+    return follow, coupling.T @ follow + pressed.by_motors.T @ forces
 
 
 def inverse_stiffness(model: SoftModel, tangent: FloatArray) -> FloatArray:

@@ -12,10 +12,11 @@ from softrobots.core.checks import FloatArray, finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.model.friction_coordinates import slipping
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.contact.pressed_gaps import motor_slopes, pressed_gaps
 from softrobots.statics.elastic_state import ElasticState, elastic_state
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
-from softrobots.statics.loads import AppliedLoad, Load
+from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import tip_motion
 from softrobots.statics.tip_search import LEVER, LocalSolution
 from softrobots.statics.tip_steps import Pull, pull
@@ -168,14 +169,14 @@ class LoadedTip:
     def motion(self, state: ElasticState) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of tip and elastic coordinates by the actuators; see `sensitivity.tip_motion`."""
         motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
-        return tip_motion(self.model, motors, springs, state.tangent, state.load.coupling)
+        return tip_motion(self.model, motors, springs, state.tangent, state.load.coupling, pressed_gaps(state))
 
     def pull(self, state: ElasticState, follow: FloatArray) -> Pull | None:
         """Return the tensions with their derivatives; None of muscles of given length that push."""
         if not self.model.actuators.least_tension:
             return None
         count = len(self.model.muscles)
-        by_motors, by_elastic = state.point.motor_derivatives(AppliedLoad(self.model, self.load).at(state.q))
+        by_motors, by_elastic = motor_slopes(state, self.load)
         slope = (by_motors + by_elastic @ follow)[-count:]
         given = [row for row, muscle in enumerate(self.model.muscles) if muscle.kind == "tension"]
         slope[given, np.array(given, dtype=int) - count] = 1.0

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -12,6 +14,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
 from softrobots.core.errors import ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
+from softrobots.environment.environment import Environment
 from softrobots.model.friction_coordinates import untouched
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
@@ -82,6 +85,14 @@ class Trajectory:
             return None
         return read_only(np.array([equilibrium.link_moments for equilibrium in self.equilibria]))
 
+    @cached_property
+    def contact_forces(self) -> Mapping[str, FloatArray]:
+        """Sum of the normal forces on each obstacle that is touched, or on a link by another one, shape (n,) [N]."""
+        contacts = [equilibrium.contacts for equilibrium in self.equilibria]
+        names = dict.fromkeys(contact.obstacle for row in contacts for contact in row)
+        forces = [[sum(one.normal_force for one in row if one.obstacle == name) for row in contacts] for name in names]
+        return MappingProxyType({name: read_only(np.array(row, float)) for name, row in zip(names, forces, strict=True)})
+
     @property
     def required_pressure(self) -> float | None:
         """Smallest gauge pressure at which no link wrinkles on the path [Pa], [Troise 2021] (3); None without links.
@@ -123,6 +134,7 @@ def follow_trajectory(
     times: Any = None,
     gain: float = 50.0,
     allow_jumps: bool = False,
+    environment: Environment | None = None,
     progress: bool | str = False,
 ) -> Trajectory:
     """Find motor coordinates that move the loaded tip through target positions, or poses.
@@ -149,6 +161,7 @@ def follow_trajectory(
         gain: Gain `K` of "paper" [1/s]; intervals longer than half its inverse are integrated in several steps.
         allow_jumps: Where a waypoint cannot be reached from the last one by a continuous motion (a motor limit, a turn of the
             base under a tip that passes over it), go on from the nearest other solution instead of raising.
+        environment: Obstacles that the robot may lean on without friction, only with "newton"; None: free space.
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
@@ -163,14 +176,14 @@ def follow_trajectory(
             path straight through it is followed.
         EquilibriumNotFound: If a waypoint has no equilibrium.
     """
-    choice("method", method, METHODS)
+    choice("method", method, METHODS if environment is None else METHODS[:1])
     model = untouched(check_model(model))
     goals = Goal.path(targets)
     points = np.array([goal.position for goal in goals])
     orientations = None if goals[0].rotation is None else read_only(np.array([goal.rotation for goal in goals]))
     if method == "paper" and orientations is not None:
         raise ParameterError("method", method, "'newton' or 'fixed_point' for poses: it follows positions")
-    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity, environment=environment)
     positive_number("gain", gain, "1/s")
     start_motors(model, q_motors0)
     if method == "paper" and model.muscles and model.muscle_input == "forces":
@@ -185,7 +198,7 @@ def follow_trajectory(
         moments = increasing("times", finite_array("times", times, (len(points),), "s"), "s")
     inner = "newton" if method == "newton" else "fixed_point"
     options: dict[str, Any] = {"wrench": dict(load.wrenches), "gravity": gravity, "method": inner, "tolerance": tolerance}
-    options["orientation"] = goals[0].rotation
+    options |= {"orientation": goals[0].rotation, "environment": environment}
     try:
         begin = solve_ik(model, points[0], q_motors0=q_motors0, elbow=elbow, **options)
     except TargetUnreachable as error:

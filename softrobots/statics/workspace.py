@@ -14,7 +14,9 @@ from softrobots.core.checks import FloatArray, finite_array, positive_integer, r
 from softrobots.core.errors import NeutralEquilibrium, ParameterError
 from softrobots.core.npz_file import LARGEST
 from softrobots.core.progress import with_progress
+from softrobots.environment.environment import Environment
 from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.contact.pressed_gaps import pressed_gaps
 from softrobots.statics.elastic_state import elastic_state, largest_residual
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
@@ -61,6 +63,7 @@ def sample_workspace(
     wrench: Any = None,
     frame: str | None = None,
     gravity: Any = None,
+    environment: Environment | None = None,
     seed: int = 0,
     checkpoint: str | os.PathLike[str] | None = None,
     progress: bool | str = False,
@@ -77,6 +80,8 @@ def sample_workspace(
         wrench: Wrench at `frame`, shape (6,) [N, N m], or `{frame: (6,)}` for several.
         frame: Frame of `force` and `wrench`; the tip by default.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        environment: Obstacles that the robot may lean on without friction; None: free space. Samples whose motors leave the
+            robot no room are refused.
         seed: Seed of the samples.
         checkpoint: Folder for finished samples. After an interruption, even a killed process, the same call continues from
             there, with identical results. Delete the folder when the workspace is saved. None: no checkpoint.
@@ -95,7 +100,7 @@ def sample_workspace(
     check_model(model)
     if model.n_motors == 0:
         raise ParameterError("model", model, "a robot with at least one motor or muscle")
-    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity)
+    load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity, environment=environment)
     most = LARGEST // (8 * (model.n_motors + model.n_springs + 5))  # so that `save_result` accepts them
     count = positive_integer("samples", samples, most)
     if isinstance(seed, bool) or not isinstance(seed, int | np.integer) or seed < 0:
@@ -111,7 +116,8 @@ def sample_workspace(
 
 def _identity(model: SoftModel, load: Load, count: int, seed: int) -> dict[str, Any]:
     """Everything that the samples depend on."""
-    return {
+    obstacles = {} if load.environment is None else {"environment": load.environment.to_dict()}
+    return obstacles | {
         "job": "sample_workspace",
         "version": __version__,
         "urdf": model.urdf,
@@ -176,7 +182,8 @@ def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArra
         return None
     by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, model.tip)[:3])
     try:
-        slope = tip_motion(model, by_motors, by_springs, state.tangent, state.load.coupling)[0] @ model.actuators.basis
+        matrices = state.tangent, state.load.coupling, pressed_gaps(state)
+        slope = tip_motion(model, by_motors, by_springs, *matrices)[0] @ model.actuators.basis
     except NeutralEquilibrium:
         return None
     tip = np.array(frame_placement(model, state.q, model.tip).translation)

@@ -35,6 +35,7 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
         *attributes(equilibrium, wrinkled="", saturated="", muscle_lengths="m", muscle_forces="N", muscle_slack="", stable=""),
         Fact("stability", equilibrium.stability.kind),
         Fact("growth_rate", equilibrium.stability.growth_rate, "1/s"),
+        *_contacts(equilibrium),
         *attributes(equilibrium, conservative="", within_limits="", residual="N m", tolerance="N m", iterations="-", method=""),
     ]
     return model_answer(model, equilibrium.load, facts)
@@ -43,7 +44,9 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
 def model_answer(model: SoftModel, load: Load, facts: Sequence[Fact]) -> dict[str, Any]:
     """Facts of a loaded robot after its names, its wrenches by frame [N, N m], force first, and gravity [m/s^2], if any."""
     names = {"motor_joints": model.motor_joints, "spring_joints": model.spring_joints, "tip": model.tip}
-    loaded = {"wrenches": dict(load.wrenches), "gravity": load.gravity}
+    loaded: dict[str, Any] = {"wrenches": dict(load.wrenches), "gravity": load.gravity}
+    if load.environment is not None:
+        loaded["environment"] = load.environment.to_dict()
     return {"robot": model.pinocchio.name, **names, "load": loaded, **answer_of(facts)}
 
 
@@ -59,7 +62,7 @@ def coordinate_lines(equilibrium: Equilibrium) -> list[str]:
     n = len(names)
     motors = _table("motor", names, equilibrium.q_motors[:n], units[:n], equilibrium.motor_torques[:n])
     springs = _table("spring", model.spring_joints, equilibrium.q_springs, model.springs.units, equilibrium.spring_torques)
-    parts = [motors, _actuators(equilibrium), springs, _links(equilibrium)]
+    parts = [motors, _actuators(equilibrium), springs, _links(equilibrium), contact_lines(equilibrium)]
     return [*head_lines(model, equilibrium.load), *(line for part in parts if part for line in ("", *part))]
 
 
@@ -189,6 +192,25 @@ def _links(equilibrium: Equilibrium) -> list[str]:
         cells = (f"{moment} N m", f"{force} N", f"{slack} N m", shares[0], f"{wrinkling} N m", shares[1])
         rows.append((str(number), *cells, "plateau" if equilibrium.saturated[number - 1] else ""))
     return [line.rstrip() for line in aligned(rows, right=(1, 2, 3, 4, 5, 6))]
+
+
+def contact_lines(equilibrium: Equilibrium) -> list[str]:
+    """Table of the contacts; nothing in free space."""
+    if equilibrium.environment is None:
+        return []
+    rows = [("contact of", "with", "", "force", "", "force x, y, z [N]", "at x, y, z [m]", "gap")]
+    for one in equilibrium.contacts:
+        vectors = formatted(one.force), formatted(one.point)
+        rows.append((one.link, one.obstacle, one.status, _fixed(one.normal_force), "N", *vectors, f"{one.gap:.2g} m"))
+    return aligned(rows, right=(3,)) if equilibrium.contacts else ["contacts  none: the robot touches nothing"]
+
+
+def _contacts(equilibrium: Equilibrium) -> list[Fact]:
+    """The contacts as plain data by the names of their attributes, if there are obstacles."""
+    if equilibrium.environment is None:
+        return []
+    units = "normals and status without unit; points, gap and slip [m]; forces [N]"
+    return [Fact("contacts", [vars(contact) for contact in equilibrium.contacts], units)]
 
 
 def _fixed(value: float) -> str:

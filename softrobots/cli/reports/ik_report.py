@@ -57,6 +57,7 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
         Fact("wrinkled", [equilibrium.wrinkled for equilibrium in equilibria]),
         Fact("stable", [equilibrium.stable for equilibrium in equilibria]),
         Fact("within_limits", [equilibrium.within_limits for equilibrium in equilibria]),
+        *_contact_forces(trajectory),
         Fact("residual", [equilibrium.residual for equilibrium in equilibria], "N m"),
         Fact("method", trajectory.method),
     ]
@@ -82,6 +83,9 @@ def trajectory_lines(trajectory: Trajectory) -> list[str]:
         ("stable", _everywhere([equilibrium.stable for equilibrium in equilibria])),
         ("within limits", _everywhere([equilibrium.within_limits for equilibrium in equilibria])),
     ]
+    for name, force in trajectory.contact_forces.items():
+        worst = int(np.argmax(force))
+        summary.append((f"force on {name}", f"up to {formatted(force[worst])} N, at waypoint {worst + 1}"))
     if trajectory.link_moments is not None:
         largest = trajectory.link_moments.max(axis=0)
         margin, slack = (_margin(trajectory, name) for name in ("wrinkling_margins", "slack_margins"))
@@ -93,6 +97,12 @@ def trajectory_lines(trajectory: Trajectory) -> list[str]:
             ("required pressure", f"{formatted(trajectory.required_pressure)} Pa"),
         ]
     return [*head_lines(model, equilibria[0].load), "", *aligned(rows, right=(1, 2, 3, 4, 6)), "", *aligned(summary)]
+
+
+def _contact_forces(trajectory: Trajectory) -> list[Fact]:
+    """The normal force on each obstacle over the path; nothing in free space."""
+    forces = trajectory.contact_forces
+    return [Fact("contact_forces", forces, "N")] if forces else []
 
 
 def _motor_torques(trajectory: Trajectory) -> FloatArray:

@@ -6,7 +6,8 @@ measured angles acts like an error of the torques,
 .. math:: \delta\tau_k = C^T K_t^{-1} \frac{\partial \tau_s}{\partial k} \delta k, \qquad
    \delta\tau_q = -\left( \frac{\partial (J_m^T f - g_m)}{\partial q_m} + C^T K_t^{-1} C \right) \delta q_m
 
-with the derivative `C` of the load on the springs with respect to the motors (`Equilibrium.coupling`); and an error of the
+with the derivative `C` of the load on the springs with respect to the motors (`Equilibrium.coupling`); in contact the pressed
+contacts stay pressed (`softrobots.statics.sensitivity.held_motion`). And an error of the
 torques moves the force by the pseudo-inverse of :math:`d\tau_m/df`. Each moment law depends on stiffness times angle only, so
 that :math:`k \, \partial\tau_s/\partial k` is the tangent of the springs times their angles from rest.
 """
@@ -20,9 +21,10 @@ import numpy as np
 from softrobots.core.checks import FloatArray, one_each, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.contact.pressed_gaps import motor_slopes, pressed_gaps
 from softrobots.statics.elastic_state import ElasticState
-from softrobots.statics.loads import AppliedLoad, Load
-from softrobots.statics.sensitivity import inverse_stiffness
+from softrobots.statics.loads import Load
+from softrobots.statics.sensitivity import held_motion
 
 FIVE = 5.0
 """Standard deviations of the torques that may stay unexplained."""
@@ -69,13 +71,14 @@ class MeasurementErrors(NamedTuple):
         parts: dict[str, FloatArray] = {}
         if self.torque_std is not None:
             parts["torques"] = np.diag(self.torque_std)
-        coupling = state.load.coupling
+        if self.stiffness_std is None and self.motor_angle_std is None:
+            return parts
+        follow, followed = held_motion(model, state.tangent, state.load.coupling, pressed_gaps(state))
         if self.stiffness_std is not None:
             bent = model.springs.at(state.q_springs)[2] * (self.stiffness_std * (state.q_springs - model.rest))
-            parts["stiffness"] = coupling.T @ inverse_stiffness(model, state.tangent) @ bent @ _shared(model)
+            parts["stiffness"] = follow.T @ bent @ _shared(model)
         if self.motor_angle_std is not None:
-            direct, _ = state.point.motor_derivatives(AppliedLoad(model, load).at(state.q))
-            followed = coupling.T @ inverse_stiffness(model, state.tangent) @ coupling
+            direct, _ = motor_slopes(state, load)
             parts["motor_angles"] = -(direct + followed) * self.motor_angle_std
         return parts
 

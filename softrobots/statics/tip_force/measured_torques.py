@@ -12,10 +12,11 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.contact.pressed_gaps import motor_slopes, pressed_gaps
 from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian
-from softrobots.statics.loads import AppliedLoad, Load
+from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import tip_motion
 from softrobots.statics.tip_force.force_search import HIDDEN, OBSERVABLE, Directions, search_force, sphere, torque_tolerance
 from softrobots.statics.tip_force.load_errors import FIVE, MeasurementErrors
@@ -91,8 +92,8 @@ class MeasuredTorques:
         motors, springs = state.point.columns(frame_jacobian(self.model, state.q, self.frame)[:3])
         felt = state.load.coupling
         if self.model.structure.actuator_laws is not None:  # a tension by law is not conjugate to its input
-            felt = state.point.motor_derivatives(AppliedLoad(self.model, self.base).at(state.q))[1].T
-        moved, _ = tip_motion(self.model, motors, springs, state.tangent, felt)
+            felt = motor_slopes(state, self.base)[1].T
+        moved, _ = tip_motion(self.model, motors, springs, state.tangent, felt, pressed_gaps(state))
         return Directions.of(moved.T, self.model.reach, self.span)
 
     def explanation(self, force: FloatArray, state: ElasticState, iterations: int) -> Explanation:

@@ -79,6 +79,7 @@ def _jump(tip: LoadedTip, target: Goal, start: FloatArray, tolerance: float) -> 
     """Solution for a waypoint from any start, where the path from the previous one is blocked."""
     model, load = tip.model, tip.load
     options: dict[str, Any] = {"wrench": dict(load.wrenches), "gravity": load.gravity, "tolerance": tolerance}
+    options |= {"environment": load.environment}
     ik = solve_ik(model, target.position, orientation=target.rotation, q_motors0=start, method=tip.method, **options)
     state = elastic_state(model, ik.q_motors, ik.equilibrium.q_springs, load)
     return LocalSolution(ik.q_motors, state, ik.error, ik.orientation_error, ik.iterations)

@@ -1,0 +1,268 @@
+"""What follows from equilibria in contact: derivatives, estimated forces, modes, files, refusals."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from functools import cache, partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+
+import softrobots as sr
+from softrobots.environment.environment import Environment
+from softrobots.environment.obstacles import Box, HalfSpace, Sphere
+from softrobots.statics.contact.contact_sensitivity import ContactSensitivity
+from softrobots.statics.kinematics import frame_placement
+from tests.support.law_robots import triples
+from tests.support.laws import law
+from tests.support.rods import cantilever_frequencies
+
+MOTORS, FORCE = np.array([0.3, 0.4, -0.3]), np.array([5.0, 0.0, -20.0])
+WALL = HalfSpace((-1.0, 0.2, -0.1), -1.0)
+PROP = Box((0.2, 0.2, 0.2), (0.63, 0.235, -0.03))
+CASES = {"wall": [WALL], "sphere": [Sphere(0.1, (1.03, 0.335, -0.045))], "wall and prop": [WALL, PROP]}
+
+
+@cache
+def leaning(name: str) -> sr.Equilibrium:
+    """The arm on its obstacles, pressed on each of them."""
+    arm = sr.load_model(sr.InflatableArm())
+    options = {"gravity": sr.EARTH_GRAVITY, "environment": Environment(CASES[name]), "tolerance": 1e-13}
+    found = sr.solve_equilibrium(arm, MOTORS, FORCE, **options)
+    assert [contact.status for contact in found.contacts] == ["pressed"] * len(CASES[name])
+    return found
+
+
+def normal_forces(found: sr.Equilibrium) -> np.ndarray:
+    return np.array([contact.normal_force for contact in found.contacts])
+
+
+def fourth_order(function: Callable, at: np.ndarray, step: float) -> np.ndarray:
+    """Differences of fourth order; the derivative is in the last axis."""
+    columns = []
+    for move in step * np.eye(len(at)):
+        near, far = (function(at + share * move) - function(at - share * move) for share in (1.0, 2.0))
+        columns.append((8.0 * near - far) / (12.0 * step))
+    return np.stack(columns, axis=-1)
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_derivatives_in_contact_are_those_of_solved_equilibria(name: str) -> None:
+    """Tip and contact forces by motors and by a force at the tip, to 1e-7: steps of 1e-3 rad leave 5e-9 beside the sphere."""
+    found = leaning(name)
+    arm, slopes = found.model, sr.contact_sensitivity(found.model, found)
+
+    def moved(motors: np.ndarray, push: np.ndarray) -> np.ndarray:
+        options = {"gravity": sr.EARTH_GRAVITY, "environment": found.environment, "q_springs0": found.q_springs}
+        there = sr.solve_equilibrium(arm, motors, FORCE + push, **options, tolerance=1e-13)
+        return np.concatenate([there.tip_position, normal_forces(there), there.motor_torques])
+
+    count = len(found.contacts)
+    by_motors = fourth_order(lambda q: moved(q, np.zeros(3)), MOTORS, 1e-3)
+    by_force = fourth_order(lambda f: moved(MOTORS, f), np.zeros(3), 0.05)
+    jacobian = sr.elastostatic_jacobian(arm, found)
+    pairs = [(jacobian, by_motors[:3]), (slopes.by_motors, by_motors[3 : 3 + count])]
+    pairs += [(sr.compliance(arm, found)[:3, :3], by_force[:3]), (slopes.by_wrench[:, :3], by_force[3 : 3 + count])]
+    pairs += [(jacobian.T, by_force[3 + count :])]  # Maxwell-Betti: the constraints do no work
+    for closed, differences in pairs:
+        assert np.abs(closed - differences).max() < 1e-7 * np.abs(differences).max()
+    assert slopes.contacts == found.contacts
+
+
+def test_forces_follow_obstacles_that_come_nearer() -> None:
+    """Each obstacle moved along the normal of its contact, by differences of fourth order."""
+    found = leaning("wall and prop")
+    slopes, moves = sr.contact_sensitivity(found.model, found), np.eye(4)
+
+    def approached(distances: np.ndarray) -> np.ndarray:
+        environment = found.environment
+        for contact, distance in zip(found.contacts, distances, strict=True):
+            moves[:3, 3] = distance * contact.normal
+            environment = environment.moved(contact.obstacle, moves)
+        options = {"gravity": sr.EARTH_GRAVITY, "environment": environment, "q_springs0": found.q_springs}
+        there = sr.solve_equilibrium(found.model, MOTORS, FORCE, **options, tolerance=1e-13)
+        return np.concatenate([normal_forces(there), there.q_springs])
+
+    differences = fourth_order(approached, np.zeros(2), 1e-4)
+    expected = np.concatenate([slopes.by_approach, slopes.springs_by_approach])
+    assert np.abs(expected - differences).max() < 1e-7 * np.abs(differences).max()
+
+
+def test_nothing_pressed_has_no_forces_and_the_derivatives_of_free_space() -> None:
+    arm = sr.load_model(sr.InflatableArm())
+    far = Environment([HalfSpace((0.0, 0.0, 1.0), -5.0)])
+    found, free = (sr.solve_equilibrium(arm, MOTORS, FORCE, environment=around) for around in (far, None))
+    assert sr.contact_sensitivity(arm, found).by_motors.shape == (0, 3)
+    assert np.abs(sr.elastostatic_jacobian(arm, found) - sr.elastostatic_jacobian(arm, free)).max() < 1e-9
+
+
+@law("contact_sensitivity", "statics.contact.contact_sensitivity.ContactSensitivity")
+@given(step=triples, push=triples)
+@settings(max_examples=5)
+def test_forces_go_where_their_derivatives_point(step: tuple, push: tuple) -> None:
+    """A small step of motors and force changes the contact forces as the derivatives say, up to the square of the step."""
+    found = leaning("wall and prop")
+    slopes, wrench = sr.contact_sensitivity(found.model, found), np.array([*push, 0.0, 0.0, 0.0])
+    options = {"gravity": sr.EARTH_GRAVITY, "environment": found.environment, "q_springs0": found.q_springs}
+    left = []
+    assert isinstance(slopes, ContactSensitivity)
+    for size in (2e-3, 1e-3):
+        there = sr.solve_equilibrium(found.model, MOTORS + size * np.array(step), FORCE + size * np.array(push), **options)
+        predicted = size * (slopes.by_motors @ step + slopes.by_wrench @ wrench)
+        left.append(np.abs(normal_forces(there) - normal_forces(found) - predicted).max())
+    assert left[1] <= 0.3 * left[0] + 1e-8
+
+
+# --- Estimated forces
+
+
+@pytest.mark.parametrize("name", ["wall", "sphere"])
+def test_motor_torques_tell_the_contact_force_at_a_given_place(name: str) -> None:
+    """The contact is estimated as a force at its point along its normal, the obstacle unknown: 1e-8 of it.
+
+    The arm leans on the obstacle under its weight alone, which is known.
+    """
+    arm = sr.load_model(sr.InflatableArm())
+    options = {"gravity": sr.EARTH_GRAVITY, "environment": Environment(CASES[name]), "tolerance": 1e-13}
+    found = sr.solve_equilibrium(arm, (0.3, 0.2, -0.3) if name == "sphere" else MOTORS, **options)
+    (contact,) = found.contacts
+    assert contact.normal_force > 1.0
+    point = frame_placement(arm, found.q, contact.link).actInv(contact.point)
+    marked = sr.with_points(arm, {"touched": (contact.link, point)})
+    estimate = partial(sr.estimate_load, marked, found.q_motors, found.motor_torques, frame="touched")
+    known = estimate(directions=contact.normal, gravity=sr.EARTH_GRAVITY)
+    assert np.abs(known.force - contact.force).max() < 1e-8 * contact.normal_force
+    assert np.abs(known.equilibrium.q_springs - found.q_springs).max() < 1e-8
+    anywhere = estimate(gravity=sr.EARTH_GRAVITY)  # its direction unknown: all that the motors feel of it
+    hidden = anywhere.unobservable_directions
+    felt = np.eye(3) - hidden.T @ hidden
+    assert np.abs(felt @ (anywhere.force - contact.force)).max() < (1e-6 if len(hidden) == 0 else 1e-2) * contact.normal_force
+
+
+def test_a_known_obstacle_is_told_from_the_force_at_the_tip() -> None:
+    """The prop under the arm is known, the force at the tip is not: both come back from three motor torques."""
+    arm = sr.load_model(sr.InflatableArm())
+    options = {"gravity": sr.EARTH_GRAVITY, "environment": Environment([PROP])}
+    found = sr.solve_equilibrium(arm, (0.3, 0.45, -1.2), FORCE, **options, tolerance=1e-13)
+    assert normal_forces(found).min() > 1.0
+    estimate = sr.estimate_load(arm, found.q_motors, found.motor_torques, **options)
+    assert np.abs(estimate.force - FORCE).max() < 1e-8 * np.linalg.norm(FORCE)
+    assert np.abs(normal_forces(estimate.equilibrium) - normal_forces(found)).max() < 1e-7
+    free = sr.estimate_load(arm, found.q_motors, found.motor_torques, gravity=sr.EARTH_GRAVITY)
+    assert np.linalg.norm(free.force - FORCE) > 1.0  # without the obstacle it would be another one
+
+
+# --- Modes
+
+
+def propped(count: int) -> np.ndarray:
+    """Relative errors of the first two frequencies of a clamped rod on a prop at its end, in the plane of the prop."""
+    radius, stiffness = 1e-4, 1.0
+    rod = sr.PccArm(
+        segment_lengths=(1.0,), muscle_azimuths=(), bending_stiffness=stiffness, linear_density=1.0, radius=radius,
+        hinges=count, chain="lumped", torsion=False, extension=False,
+    )  # fmt: skip
+    model = sr.load_model(rod)
+    prop = Environment([Sphere(0.05, (-0.05 - radius + 1e-6, 0.0, 1.0 + 1e-7))])
+    held = sr.solve_equilibrium(model, (), environment=prop, tolerance=1e-13)
+    assert normal_forces(held).tolist() == pytest.approx([3.0 * stiffness * 1e-6], rel=0.1)  # 3 EI w / L^3
+    modes = sr.vibration_modes(model, held)
+    assert len(modes.frequencies) == model.n_springs - 1
+    omega = 2.0 * np.pi * modes.frequencies[:8]
+    clamped, pinned = cantilever_frequencies(0.0), np.array([3.92660231, 7.06858275]) ** 2
+    found = [omega[np.argmin(np.abs(omega - exact))] / exact - 1.0 for exact in pinned]
+    free = [omega[np.argmin(np.abs(omega - exact))] / exact - 1.0 for exact in clamped]
+    assert np.abs(free).max() < 0.05  # across the prop it swings as a cantilever
+    return np.array(found)
+
+
+def test_a_propped_rod_has_the_frequencies_of_a_propped_cantilever() -> None:
+    """Clamped and simply supported: 3.9266^2 and 7.0686^2 (Blevins, table 8-1), of second order or better in the hinges."""
+    coarse, fine = propped(8), propped(16)
+    assert np.abs(fine).max() < 3e-3
+    assert np.log2(np.abs(coarse) / np.abs(fine)).min() > 1.8
+
+
+def test_the_modes_of_an_arm_on_a_wall_by_hand() -> None:
+    """One link with two springs, its end on a wall: one mode, whose motion along the wall is all that the constraint leaves.
+
+    With the gradient (a, b) of the gap the motion is along (-b, a), and the square of the frequency is the quotient of its
+    stiffness and mass. Mass and stiffness of the free robot come from vibration_modes of the same shape under the force.
+    """
+    model = sr.load_model(sr.InflatableArm(link_lengths=(0.6,)))
+    wall = Environment([HalfSpace((-0.8, -0.6, 0.0), -0.5)])
+    found = sr.solve_equilibrium(model, (0.2, 0.1), (10.0, 5.0, -5.0), environment=wall, tolerance=1e-13)
+    (contact,) = found.contacts
+    modes = sr.vibration_modes(model, found)
+    assert modes.frequencies.shape == (1,)
+    across = np.array([-found.contact_gradients[0, 1], found.contact_gradients[0, 0]])
+    point = frame_placement(model, found.q, contact.link).actInv(contact.point)
+    marked = sr.with_points(model, {"touched": (contact.link, point)})
+    wrenches = {"tip": (10.0, 5.0, -5.0, 0, 0, 0), "touched": (*contact.force, 0, 0, 0)}
+    dead = sr.solve_equilibrium(marked, found.q_motors, wrench=wrenches, q_springs0=found.q_springs, tolerance=1e-13)
+    assert np.abs(dead.q_springs - found.q_springs).max() < 1e-11
+    free = sr.vibration_modes(marked, dead)
+    square = (across @ found.tangent_stiffness @ across) / (across @ free.mass_matrix @ across)
+    assert modes.frequencies[0] == pytest.approx(np.sqrt(square) / (2.0 * np.pi), rel=1e-10)
+    assert np.abs(found.contact_gradients @ modes.shapes).max() < 1e-12  # the gap stays closed
+
+
+# --- Files
+
+
+@pytest.mark.parametrize("ending", [".npz", ".json"])
+@pytest.mark.parametrize("name", CASES)
+def test_a_saved_equilibrium_comes_back_with_its_contacts(name: str, ending: str, tmp_path: Path) -> None:
+    found = leaning(name)
+    again = sr.load_result(sr.save_result(found, tmp_path / f"leaning{ending}"))
+    assert again.environment == found.environment
+    assert np.array_equal(again.q_springs, found.q_springs)
+    assert (again.stable, again.converged) == (True, True)
+    assert [(one.link, one.obstacle, one.status) for one in again.contacts] == [
+        (one.link, one.obstacle, one.status) for one in found.contacts
+    ]
+    for one, other in zip(again.contacts, found.contacts, strict=True):
+        assert np.abs(one.force - other.force).max() < 1e-11 * other.normal_force
+        assert np.array_equal(one.point, other.point)
+    assert np.abs(again.motor_torques - found.motor_torques).max() < 1e-10
+    modes = sr.vibration_modes(found.model, found)
+    kept = sr.load_result(sr.save_result(modes, tmp_path / f"modes{ending}"))
+    assert np.allclose(kept.frequencies, modes.frequencies, rtol=1e-12)
+    assert kept.eigenvalues.shape == (2 * len(modes.frequencies),)
+
+
+def test_a_file_with_a_robot_inside_of_an_obstacle_is_refused(tmp_path: Path) -> None:
+    """The wall is moved into the robot: its forces would still balance."""
+    file = sr.save_result(leaning("wall"), tmp_path / "leaning.json")
+    text = file.read_text(encoding="utf-8")
+    assert text.count("-1.0") >= 1
+    deeper = text.replace('\\"offset\\": -1.0', '\\"offset\\": -0.9')
+    assert deeper != text
+    file.write_text(deeper, encoding="utf-8")
+    with pytest.raises(sr.FileFormatError, match=r"inside of an obstacle|claims a residual"):
+        sr.load_result(file)
+
+
+# --- Refusals
+
+
+def test_what_cannot_take_obstacles_says_so() -> None:
+    found = leaning("wall")
+    refused: dict[str, Any] = {
+        "linear model": lambda: sr.linearize(found.model, found),
+        "simulation": lambda: sr.simulate(found.model, 0.1, MOTORS, start=found),
+        "by parameters": lambda: sr.sensitivity(found.model, found, "stiffness"),
+    }
+    for words, call in refused.items():
+        with pytest.raises(sr.ParameterError, match=f"{words}.*takes no obstacles"):
+            call()
+    options = {"environment": found.environment}
+    with pytest.raises(sr.ParameterError, match="method"):
+        sr.solve_ik(found.model, (0.9, 0.3, 0.2), method="fixed_point", **options)
+    with pytest.raises(sr.ParameterError, match="method"):
+        sr.follow_trajectory(found.model, [(0.9, 0.3, 0.2)], method="paper", times=[0.0], **options)
+    with pytest.raises(sr.ParameterError, match="method"):
+        sr.estimate_load(found.model, MOTORS, found.motor_torques, method="alternation", **options)
