@@ -10,6 +10,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
+from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
 
 INSIDE = 2
 """Feature of the minimum between the ends of a core; 0 and 1 are start and end, larger numbers crossed borders."""
@@ -35,7 +36,7 @@ class Candidates(NamedTuple):
 
 
 def find_candidates(
-    cores: Cores, places: CorePlaces, fields: list[tuple[Field, Any]], margin: float, merged: float
+    cores: Cores, places: CorePlaces, fields: list[tuple[Field, Any]], pairs: Any, margin: float, merged: float
 ) -> Candidates:
     """Find the candidates with gaps of at most a margin.
 
@@ -43,6 +44,7 @@ def find_candidates(
         cores: The cores of the robot.
         places: Where they are.
         fields: Distances from the obstacles, with the number of each.
+        pairs: Capsules that may touch each other, shape (n, 2), integers; None without contact of the robot with itself.
         margin: Largest gap [m].
         merged: Distance within which candidates are one [m].
 
@@ -52,32 +54,78 @@ def find_candidates(
     ends = places.ends.reshape(-1, 3).take(cores.single_ends, 0)
     limits = margin + cores.radii
     end_limits = limits.take(cores.end_capsules)[:, None]
-    parts: list[tuple[Field, Any]] = []
-    found: list[tuple[Any, ...]] = []
+    found: list[_Found] = []
     for field, numbers in fields:
         distances = field.distance(ends)
         near, which = (distances <= end_limits).nonzero()
-        capsules, features, points = cores.end_capsules.take(near), cores.end_features.take(near), ends.take(near, 0)
-        values, normals = field.at(points, which)
-        close = (values <= limits.take(capsules)).nonzero()[0]
-        if len(close) < len(values):  # `distance` was a lower bound
-            which, capsules, features, points = (column.take(close, 0) for column in (which, capsules, features, points))
-            values, normals = values.take(close), normals.take(close, 0)
-        if not isinstance(field, HalfSpaces):
-            # the distance changes by at most the length of the way: what is far at both ends is far between them
-            least = 0.5 * (distances[cores.end_numbers].sum(axis=1) - cores.lengths[:, None])
-            one, other = np.nonzero((least <= limits[:, None]) & (cores.lengths > 0.0)[:, None])
-            if len(one):
-                inner = core_points(field, other, places.ends[one, 0], places.spans[one], limits[one], merged)
-                which = np.concatenate([which, other[inner.pairs]])
-                capsules = np.concatenate([capsules, one[inner.pairs]])
-                features = np.concatenate([features, INSIDE + inner.features])
-                points = np.concatenate([points, inner.points])
-                values, normals = np.concatenate([values, inner.distances]), np.concatenate([normals, inner.normals])
-        parts.append((field, which))
-        found.append((capsules, numbers.take(which), features, points, values, normals))
+        of_ends = _ends(field, cores, ends, near, which, limits)
+        if isinstance(field, HalfSpaces):
+            found.append(of_ends.numbered(numbers))
+            continue
+        # the distance changes by at most the length of the way: what is far at both ends is far between them
+        least = 0.5 * (distances[cores.end_numbers].sum(axis=1) - cores.lengths[:, None])
+        one, other = np.nonzero((least <= limits[:, None]) & (cores.lengths > 0.0)[:, None])
+        found.append(_with_inner(of_ends, places, one, other, limits, merged).numbered(numbers))
+    if pairs is not None:
+        found.append(_own(cores, places, pairs, ends, limits, margin, merged, sum(len(numbers) for _, numbers in fields)))
+    parts = [(one.field, one.which) for one in found]
+    if len(found) == 1:
+        return Candidates(parts, *found[0][2:])
     if not found:
         nobody = np.zeros(0, dtype=np.intp)
         return Candidates([], nobody, nobody, nobody, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
-    columns = found[0] if len(found) == 1 else [np.concatenate(column) for column in zip(*found, strict=True)]
-    return Candidates(parts, *columns)
+    return Candidates(parts, *(np.concatenate(column) for column in zip(*(one[2:] for one in found), strict=True)))
+
+
+class _Found(NamedTuple):
+    """Candidates of one field; the rest as in `Candidates`."""
+
+    field: Field
+    which: Any
+    capsules: Any
+    obstacles: Any
+    features: Any
+    points: FloatArray
+    distances: FloatArray
+    normals: FloatArray
+
+    def numbered(self, numbers: Any) -> _Found:
+        return self._replace(obstacles=numbers.take(self.which))
+
+    def rows(self, chosen: Any) -> _Found:
+        return _Found(self.field, *(column.take(chosen, 0) for column in self[1:]))
+
+
+def _ends(field: Field, cores: Cores, ends: FloatArray, near: Any, which: Any, limits: FloatArray) -> _Found:
+    """Ends that are near bodies."""
+    capsules, points = cores.end_capsules.take(near), ends.take(near, 0)
+    values, normals = field.at(points, which)
+    found = _Found(field, which, capsules, which, cores.end_features.take(near), points, values, normals)
+    close = (values <= limits.take(capsules)).nonzero()[0]
+    return found if len(close) == len(values) else found.rows(close)  # `distance` was a lower bound
+
+
+def _with_inner(of_ends: _Found, places: CorePlaces, one: Any, other: Any, limits: FloatArray, merged: float) -> _Found:
+    """Add candidates inside of the cores `one` near the bodies `other`."""
+    if not len(one):
+        return of_ends
+    inner = core_points(
+        of_ends.field, other, places.ends.take(one, 0)[:, 0], places.spans.take(one, 0), limits.take(one), merged
+    )
+    which = other.take(inner.pairs)
+    new = (which, one.take(inner.pairs), which, INSIDE + inner.features, inner.points, inner.distances, inner.normals)
+    return _Found(of_ends.field, *(np.concatenate(pair) for pair in zip(of_ends[1:], new, strict=True)))
+
+
+def _own(
+    cores: Cores, places: CorePlaces, pairs: Any, ends: FloatArray, limits: FloatArray, margin: float, merged: float, count: int
+) -> _Found:
+    """Candidates between the robot's own capsules, which are obstacles after the `count` of the environment."""
+    field = own_capsules(cores, places)
+    near = near_pairs(cores, places, pairs, margin)
+    touched = np.unique(np.concatenate([cores.end_numbers[near[:, 0], end] * cores.count + near[:, 1] for end in (0, 1)]))
+    found = _ends(field, cores, ends, touched // cores.count, touched % cores.count, limits)
+    long = near[cores.lengths[near[:, 0]] > 0.0]
+    found = _with_inner(found, places, long[:, 0], long[:, 1], limits, merged)
+    found = found.rows(different_contacts(cores, field, found.capsules, found.features, found.which, found.points))
+    return found._replace(obstacles=count + found.which)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import threading
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
-from softrobots.environment.capsules import RobotCapsule
-from softrobots.model.soft_model import SoftModel
+from softrobots.environment.capsules import RobotCapsule, robot_capsules
+from softrobots.model.soft_model import SoftModel, check_model
 
 SAME_POINT = 1e-9
 """Distance, relative to the reach, within which points are one."""
@@ -88,3 +90,25 @@ class Cores:
         same = same & (radii[:, None] == radii)
         first = same.argmax(axis=1) if self.count else np.zeros(0, dtype=np.intp)
         return np.unique(first, return_inverse=True)
+
+
+class _KnownCores(threading.local):
+    """Cores of the models that the calling thread has used."""
+
+    def __init__(self) -> None:
+        self.by_model: WeakKeyDictionary[SoftModel, Cores] = WeakKeyDictionary()
+
+
+_KNOWN = _KnownCores()
+
+
+def cores_of(model: SoftModel) -> Cores:
+    """Return the cores of a robot, made on first use in each thread.
+
+    Raises:
+        ParameterError: If `model` is not a `SoftModel`.
+        DescriptionError: If the robot has no capsules, and no collision shapes that are spheres or cylinders.
+    """
+    if check_model(model) not in _KNOWN.by_model:
+        _KNOWN.by_model[model] = Cores(model, robot_capsules(model))
+    return _KNOWN.by_model[model]

@@ -21,11 +21,11 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
-from softrobots.environment.capsules import robot_capsules
-from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores
+from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores, cores_of
 from softrobots.environment.distance_fields import Field, HalfSpaces, cross, skew
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
+from softrobots.environment.self_contact import relative_curvature, self_contact_pairs
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
 
@@ -57,7 +57,7 @@ class Gaps:
         """Radii of the capsules, shape (m,) [m]."""
         self.values: FloatArray = found.distances - self.radii
         """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
-        self._cores, self._places, self._parts, self._transforms, self._reach = cores, places, found.parts, transforms, reach
+        self._cores, self.places, self._parts, self._transforms, self._reach = cores, places, found.parts, transforms, reach
 
     def __len__(self) -> int:
         """Number of candidates."""
@@ -80,8 +80,20 @@ class Gaps:
 
     @cached_property
     def moves(self) -> FloatArray:
-        """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv)."""
-        return np.asarray(self._cores.moves[self.capsules])
+        """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
+
+        Where the robot touches itself, less that of the other capsule.
+        """
+        moves = self._cores.moves.take(self.capsules, 0)
+        own = self._own_rows
+        if len(own):
+            moves[own] -= self._cores.moves[self.obstacles[own] - len(self._transforms)]
+        return np.asarray(moves)
+
+    @cached_property
+    def _own_rows(self) -> Any:
+        """Candidates of the robot with itself."""
+        return (self.obstacles >= len(self._transforms)).nonzero()[0]
 
     @cached_property
     def jacobian(self) -> FloatArray:
@@ -91,10 +103,10 @@ class Gaps:
     def _rows(self, rows: Any, directions: FloatArray, points: FloatArray, couples: Any) -> FloatArray:
         """Work of forces, shape (k, 3), at points of the cores, and of couples, per joint rate, shape (k, nv)."""
         wrenches = np.concatenate([directions, cross(points, directions) + couples], axis=1)
-        return np.asarray(wrenches.dot(self._places.jacobian) * self.moves[rows])
+        return np.asarray(wrenches.dot(self.places.jacobian) * self.moves[rows])
 
     def point_jacobian(self, rows: Any, points: FloatArray) -> FloatArray:
-        """Velocity of material points of the robot per joint rate.
+        """Velocity of material points of the robot per joint rate; where it touches itself, relative to the other capsule.
 
         Args:
             rows: Candidates whose capsules carry the points, shape (k,), integers.
@@ -103,7 +115,7 @@ class Gaps:
         Returns:
             Shape (k, 3, nv).
         """
-        linear, angular = self._places.jacobian[:3], self._places.jacobian[3:]
+        linear, angular = self.places.jacobian[:3], self.places.jacobian[3:]
         return np.asarray((linear - skew(points) @ angular) * self.moves.take(rows, 0)[:, None, :])
 
     def load(self, forces: FloatArray) -> JointLoad:
@@ -116,18 +128,24 @@ class Gaps:
         Returns:
             The load on the joints; its potential is `-sum f . x`.
         """
-        normal, nv = forces.ndim == 1, self._places.jacobian.shape[1]
+        normal, nv = forces.ndim == 1, self.places.jacobian.shape[1]
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
             return JointLoad(np.zeros(nv), np.zeros((0, nv)), np.zeros((0, nv)), None, None, 0.0, 0.0)
-        normals = self.normals.take(rows, 0)
+        normals, moves = self.normals.take(rows, 0), self._cores.moves.take(self.capsules.take(rows), 0)
         points = self.core_points.take(rows, 0)
         if normal:
             vectors = forces.take(rows)[:, None] * normals
         else:
             vectors, points = forces.take(rows, 0), points - self.radii.take(rows)[:, None] * normals
-        linear = self.point_jacobian(rows, points)
-        angular = self._places.jacobian[3:] * self.moves.take(rows, 0)[:, None, :]
+        if len(self._own_rows):  # the other capsule takes the opposite force
+            chosen = np.flatnonzero(self.obstacles[rows] >= len(self._transforms))
+            own, others = rows[chosen], self.obstacles[rows[chosen]] - len(self._transforms)
+            depths = self._cores.radii[others] if normal else np.zeros(len(own))
+            points = np.concatenate([points, self.obstacle_points[own] - depths[:, None] * self.normals[own]])
+            vectors, moves = np.concatenate([vectors, -vectors[chosen]]), np.concatenate([moves, self._cores.moves[others]])
+        jacobian, moves = self.places.jacobian, moves[:, None, :]
+        linear, angular = (jacobian[:3] - skew(points) @ jacobian[3:]) * moves, jacobian[3:] * moves
         return JointLoad(
             torque=vectors.ravel().dot(linear.reshape(-1, nv)),
             angular=angular.reshape(-1, nv),
@@ -148,12 +166,14 @@ class Gaps:
             Rows, shape (k, nv), and weights, shape (k,) [N/m]: :math:`\sum f_i\, d^2 g_i` is the derivative of the torque of
             `load(forces)` plus `rows.T @ diag(weights) @ rows`.
         """
-        nv = self._places.jacobian.shape[1]
+        nv = self.places.jacobian.shape[1]
         found, weights, first = [np.zeros((0, nv))], [np.zeros(0)], 0
         for field, which in self._parts:
             if not isinstance(field, HalfSpaces):
                 rows = first + forces[first : first + len(which)].nonzero()[0]
-                if len(rows):
+                if len(rows) and self.obstacles[first] >= len(self._transforms):
+                    self._curved_by_itself(rows, forces, found, weights)
+                elif len(rows):
                     self._curved(field, which[rows - first], rows, forces[rows], found, weights)
             first += len(which)
         if len(found) == 1:
@@ -168,7 +188,7 @@ class Gaps:
             bent = np.flatnonzero(curvatures[:, place])
             found.append(self._rows(rows[bent], directions[bent, place], points[bent], 0.0))
             weights.append(forces[bent] * curvatures[bent, place])
-        spans = self._places.spans[self.capsules[rows]]
+        spans = self.places.spans[self.capsules[rows]]
         parts = curvatures * (directions @ spans[:, :, None])[:, :, 0]
         pulls = (parts[:, :, None] * directions).sum(axis=1)  # H t
         bend = (pulls * spans).sum(axis=1)
@@ -176,6 +196,17 @@ class Gaps:
         couples = cross(spans, normals)[slides]
         found.append(self._rows(rows[slides], pulls[slides], points[slides], couples))
         weights.append(-forces[slides] / bend[slides])
+
+    def _curved_by_itself(self, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
+        """Append the terms of candidates of the robot with itself."""
+        for row in rows.tolist():
+            pair = int(self.capsules[row]), int(self.obstacles[row]) - len(self._transforms)
+            distance = float(self.values[row] + self.radii[row] + self._cores.radii[pair[1]])
+            slides = bool(self.features[row] == INSIDE)
+            point, normal = self.core_points[row], self.normals[row]
+            new, each = relative_curvature(self._cores, self.places, pair, point, normal, distance, slides)
+            found.append(np.array(new))
+            weights.append(float(forces[row]) * np.array(each))
 
     def drift(self, rates: FloatArray) -> FloatArray:
         """Velocity of the gaps while obstacles move and the robot stands, shape (m,).
@@ -203,7 +234,7 @@ class Gaps:
             The points; `Surroundings.world_points` says where they are in another configuration.
         """
         capsules, obstacles = self.capsules[rows], self.obstacles[rows]
-        joints = self._places.placements[self._cores.carrier[capsules]]
+        joints = self.places.placements[self._cores.carrier[capsules]]
         on_robot = ((self.points[rows] - joints[:, :3, 3])[:, None, :] @ joints[:, :3, :3])[:, 0]
         others = self._frames(obstacles)
         on_obstacle = ((self.obstacle_points[rows] - others[:, :3, 3])[:, None, :] @ others[:, :3, :3])[:, 0]
@@ -219,13 +250,13 @@ class Gaps:
             Points of the robot and of the obstacles, shapes (k, 3) [m]. What the one moved relative to the other since then is
             the slip.
         """
-        joints, others = self._places.placements[self._cores.carrier[points.capsules]], self._frames(points.obstacles)
+        joints, others = self.places.placements[self._cores.carrier[points.capsules]], self._frames(points.obstacles)
         on_robot = (joints[:, :3, :3] @ points.on_robot[:, :, None])[:, :, 0] + joints[:, :3, 3]
         return on_robot, (others[:, :3, :3] @ points.on_obstacle[:, :, None])[:, :, 0] + others[:, :3, 3]
 
     def _frames(self, obstacles: Any) -> FloatArray:
         """Transforms of obstacles to the world; of capsules of the robot, their joints'."""
-        joints = self._places.placements[self._cores.carrier]
+        joints = self.places.placements[self._cores.carrier]
         return np.asarray(np.concatenate([self._transforms, joints])[obstacles])
 
 
@@ -240,7 +271,8 @@ class Surroundings:
             DescriptionError: If the robot has no capsules, and no collision shapes that are spheres or cylinders.
         """
         check_environment(environment)
-        self._cores = Cores(model, robot_capsules(model))
+        self._cores = cores_of(model)
+        self._pairs = self_contact_pairs(model, self._cores) if environment.self_contact else None
         self._fields, self._transforms = obstacle_fields(environment), obstacle_transforms(environment)
         self._reach = model.reach
         links = tuple(one.link for one in self._cores.capsules)
@@ -260,5 +292,5 @@ class Surroundings:
             The candidates with their derivatives.
         """
         places = self._cores.at(q)
-        found = find_candidates(self._cores, places, self._fields, margin, SAME_POINT * self._reach)
+        found = find_candidates(self._cores, places, self._fields, self._pairs, margin, SAME_POINT * self._reach)
         return Gaps(self._cores, places, found, self._transforms, self._reach)
