@@ -14,10 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.statics.elastic_state import norm, positive, scaled
+from softrobots.statics.elastic_state import positive, scaled
 
 _LEAST = 1e-3  # least curvature along which a step is taken, relative to the springs
 _TIGHT = {"primal_tol": 1e-13, "dual_tol": 1e-13}
+_PRICE = 1e3  # of penetration in a step that cannot repair all of it, over usual energies in the box
 _FREE = 1e30  # bound that does not bind
 _SOLVED, _EQUALITY = 1, 5  # exit flag and kind of constraint of daqp
 
@@ -40,6 +41,7 @@ def contact_step(
     rows: FloatArray,
     held: Any,
     stiffness: FloatArray,
+    longest: float,
     damping: float,
     factors: Any,
 ) -> Step | None:
@@ -52,6 +54,7 @@ def contact_step(
         rows: Their gradients, shape (m, n).
         held: Which are taken to be pressed, shape (m,), truth values; the Hessian is made positive beside them.
         stiffness: Stiffness of the springs, shape (n,).
+        longest: Length of a step beyond which its components are limited to that, each by itself.
         damping: Stiffness that is added to shorten the step, relative to the springs.
         factors: An `eigenpy.LDLT` of size n.
 
@@ -68,8 +71,8 @@ def contact_step(
     found = _solve(convex, pull + shift, gradients, -gaps)
     if found is not None and shift.any() and not np.array_equal(found[1] > 0.0, held):  # other contacts are pressed
         exact, found = False, _solve(convex, pull, gradients, -gaps)
-    if found is None:
-        exact, found = False, _least_penetration(convex, pull, gradients, gaps)
+    if found is None or np.linalg.norm(soft * found[0]) > longest:
+        exact, found = False, _within(convex, pull, gradients, gaps, longest / soft)
     if found is None or not np.isfinite(found[0]).all():
         return None
     return Step(soft * found[0], found[1], exact and damping == 0.0)
@@ -87,40 +90,59 @@ def nearest_step(
     return None if found is None else np.asarray(soft * found[0])
 
 
+def repairing_step(gaps: FloatArray, rows: FloatArray, stiffness: FloatArray, longest: float) -> FloatArray | None:
+    """Return the shortest step, in the measure of the springs, that opens linearised penetrations as far as can be.
+
+    No component is larger than `longest`.
+    """
+    soft = 1.0 / np.sqrt(stiffness)
+    found = _within(np.eye(len(soft)), np.zeros(len(soft)), rows * soft, gaps, longest / soft)
+    return None if found is None else np.asarray(soft * found[0])
+
+
 def _solve(
-    hessian: FloatArray, pull: FloatArray, gradients: FloatArray, bounds: FloatArray, equal: Any = None
-) -> tuple[FloatArray, ...] | None:
-    """Minimise `s^T H s / 2 + f^T s` with `A s >= b`, and `A s = b` in some rows; the solution and its multipliers, or None."""
+    hessian: FloatArray,
+    pull: FloatArray,
+    gradients: FloatArray,
+    bounds: FloatArray,
+    equal: Any = None,
+    box: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray] | None:
+    """Minimise `s^T H s / 2 + f^T s` with `A s >= b`, and `A s = b` in some rows, and `|s| <= box`.
+
+    Returns:
+        The solution, and the multipliers of the rows; None if there is none.
+    """
     import daqp
 
-    m = len(bounds)
-    if m == 0:
+    m, limits = len(bounds), np.zeros(0) if box is None else box
+    if m + len(limits) == 0:
         return np.asarray(np.linalg.solve(hessian, -pull)), np.zeros(0)
-    above, sense = np.full(m, _FREE), np.zeros(m, dtype=np.int32)
+    above, sense = np.concatenate([limits, np.full(m, _FREE)]), np.zeros(len(limits) + m, dtype=np.int32)
+    below = np.concatenate([-limits, bounds])
     if equal is not None:
         above[equal], sense[equal] = bounds[equal], _EQUALITY
     matrices = (np.ascontiguousarray(one) for one in (hessian, pull, gradients))
-    solution, _, flag, info = daqp.solve(*matrices, above, bounds, sense, **_TIGHT)
-    return (np.array(solution), np.maximum(-np.array(info["lam"]), 0.0)) if flag == _SOLVED else None
+    solution, _, flag, info = daqp.solve(*matrices, above, below, sense, **_TIGHT)
+    return (np.array(solution), np.maximum(-np.array(info["lam"])[len(limits) :], 0.0)) if flag == _SOLVED else None
 
 
-def _least_penetration(
-    hessian: FloatArray, pull: FloatArray, gradients: FloatArray, gaps: FloatArray
-) -> tuple[FloatArray, ...] | None:
-    """The same with one more unknown, the penetration that is left, at a price above all forces."""
-    m, n = gradients.shape
-    depth = max(-float(gaps.min()), 1e-300)
-    wider = np.zeros((n + 1, n + 1))
-    wider[:n, :n], wider[n, n] = hessian, 1.0
-    price = 1e3 * (norm(pull) * depth + 1.0)
-    constraints = np.zeros((m + 1, n + 1))
-    constraints[:m, :n], constraints[:m, n], constraints[m, n] = (
-        gradients,
-        depth,
-        1.0,
-    )  # the last unknown is a share of the depth
-    found = _solve(wider, np.append(pull, price), constraints, np.append(-gaps, 0.0))
-    return None if found is None else (found[0][:n], found[1][:m])
+def _within(
+    hessian: FloatArray, pull: FloatArray, gradients: FloatArray, gaps: FloatArray, box: FloatArray
+) -> tuple[FloatArray, FloatArray] | None:
+    """The same within a box, with one more unknown where gaps cannot be kept: the share of the penetration that is left.
+
+    Its price is far above any energy in the box.
+    """
+    found = _solve(hessian, pull, gradients, -gaps, box=box)
+    if found is not None or not len(gaps) or gaps.min() >= 0.0:
+        return found
+    n, usual = len(pull), float(box @ box + abs(pull) @ box)
+    wider = np.diag(np.full(n + 1, usual))
+    wider[:n, :n] = hessian
+    constraints = np.column_stack([gradients, np.full(len(gaps), -gaps.min())])
+    found = _solve(wider, np.append(pull, _PRICE * usual), constraints, -gaps, box=np.append(box, 1.0))
+    return None if found is None else (found[0][:n], found[1])
 
 
 def _convex(

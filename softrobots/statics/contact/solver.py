@@ -18,7 +18,7 @@ from eigenpy import LDLT
 from softrobots.core.checks import FloatArray
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import softest_motion
-from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step
+from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step, repairing_step
 from softrobots.statics.contact.touch import TOUCHING, ForceTable, Touch
 from softrobots.statics.elastic_state import ElasticProblem, ElasticState, largest_residual, norm
 from softrobots.statics.stability import is_stable
@@ -26,8 +26,9 @@ from softrobots.statics.stability import is_stable
 _LARGEST_STEP = 0.5  # [rad], norm of one step; the linear model of a revolute chain is inaccurate beyond
 _ARMIJO = 1e-4  # share of the predicted decrease that a step must reach
 _SHORTEST = 1e-10  # share of a step below which it is not halved again
+_DEEP = 1e-2  # penetration that is repaired before energies count, relative to the reach
 _EXACT = 1e-12  # gap of a pressed contact that is zero, relative to the reach
-_LEAST_DAMPING, _MOST_DAMPING = 0.02, 100.0  # of steps that are too long or not good, relative to the springs
+_LEAST_DAMPING = 0.02  # of the step after one that was cut, relative to the springs
 _ESCAPE = 0.1  # [rad], step out of an unstable equilibrium
 
 
@@ -42,11 +43,12 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
     Returns:
         The last state, whether or not it is an equilibrium; the evaluations spent; and whether it is a stable equilibrium.
     """
-    state, spent, price, damping = problem.state(start), 1, 0.0, 0.0
+    state, spent = _repaired(problem, problem.state(start), most)
+    price, damping = 0.0, 0.0
     factors = LDLT(len(start))
     while spent < most and state.touch is not None and not _blocked(state.touch, problem.model.reach):
         if error_of(problem, state) > 1.0:
-            step, damping = _step(problem, state, state.touch, damping, factors)
+            step = _step(problem, state, state.touch, damping, factors)
         else:
             step = _way_out(problem, state, state.touch)
         if step is None:
@@ -55,7 +57,8 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
         spent += used
         if trial is None:
             break
-        state, damping = trial, _LEAST_DAMPING + 4.0 * damping if used > 2 else 0.25 * damping
+        damping = _LEAST_DAMPING + 4.0 * damping if used > 2 else 0.25 * damping if damping > _LEAST_DAMPING else 0.0
+        state = trial
     return state, spent, is_stable(problem.model, problem.load, state, problem.tolerance)
 
 
@@ -69,35 +72,48 @@ def error_of(problem: ElasticProblem, state: ElasticState) -> float:
     return max(state.error / allowed, max(touch.penetration, open_gap) / (_EXACT * problem.model.reach))
 
 
+def _repaired(problem: ElasticProblem, state: ElasticState, most: int) -> tuple[ElasticState, int]:
+    """Bring a robot that starts deep inside of obstacles towards their surface, bending it little; and the evaluations."""
+    reach, spent, longest = problem.model.reach, 1, _LARGEST_STEP
+    while spent < most and state.touch is not None and state.touch.penetration > _DEEP * reach and longest > _SHORTEST:
+        touch = state.touch
+        step = (
+            None if _blocked(touch, reach) else repairing_step(touch.gaps.values, touch.rows, problem.model.stiffness, longest)
+        )
+        if step is None:
+            break
+        trial = problem.state(state.q_springs + step)
+        spent += 1
+        promised = touch.penetration - max(0.0, -float((touch.gaps.values + touch.rows @ step).min()))
+        if trial.touch is None or touch.penetration - trial.touch.penetration < 0.1 * promised:
+            longest *= 0.25
+        else:
+            state = trial
+        if promised < 1e-3 * touch.penetration:  # no way out to first order
+            break
+    return state, spent
+
+
 def _blocked(touch: Touch, reach: float) -> bool:
     """Whether something penetrates that no spring moves."""
     deep = touch.gaps.values < -TOUCHING * reach
     return bool(deep.any()) and not touch.rows[deep].any(axis=1).all()
 
 
-def _step(
-    problem: ElasticProblem, state: ElasticState, touch: Touch, damping: float, factors: LDLT
-) -> tuple[Step | None, float]:
-    """Step of the quadratic programme over the gaps that it can close, damped until it is no longer than it may be.
-
-    Returns:
-        The step, and the damping.
-    """
+def _step(problem: ElasticProblem, state: ElasticState, touch: Touch, damping: float, factors: LDLT) -> Step | None:
+    """Step of the quadratic programme over the gaps that it can close."""
     stiffness, values = problem.model.stiffness, touch.gaps.values
     load = state.residual + touch.pushes
     within = np.flatnonzero(values <= _LARGEST_STEP * np.linalg.norm(touch.rows, axis=1))
     held = touch.forces[within] > 0.0
-    damping = damping if damping >= _LEAST_DAMPING else 0.0
-    while True:
-        found = contact_step(state.tangent, load, values[within], touch.rows[within], held, stiffness, damping, factors)
-        if found is None or norm(found.step) <= _LARGEST_STEP or damping > _MOST_DAMPING:
-            break
-        damping = _LEAST_DAMPING + 4.0 * damping
+    found = contact_step(
+        state.tangent, load, values[within], touch.rows[within], held, stiffness, _LARGEST_STEP, damping, factors
+    )
     if found is None:
-        return None, damping
+        return None
     forces = np.zeros(len(values))
     forces[within] = found.forces
-    return found._replace(forces=forces), damping
+    return found._replace(forces=forces)
 
 
 def _way_out(problem: ElasticProblem, state: ElasticState, touch: Touch) -> Step | None:
