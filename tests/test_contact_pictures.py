@@ -18,6 +18,7 @@ from softrobots.view.mesh_triangles import triangles
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.surroundings import drawn_obstacles
 from softrobots.view.viewer import view
+from softrobots.view.warm_start import next_solution
 from tests.support.packed_pages import scene_of
 
 TURN = Rotation.from_euler("xyz", (0.4, -0.7, 1.1)).as_matrix()
@@ -107,7 +108,7 @@ def test_a_page_holds_obstacles_points_arrows_and_newtons(arm: sr.SoftModel) -> 
     with view(arm, held) as viewer:
         text = viewer.html()
     rows = re.findall(r"</span>([^<]*)</div>", text)
-    told = {"obstacle", "wall pushes with 25 N", "post pushes with 16.3 N", "touches floor", "force"}  # |(3, 16)| = 16.28
+    told = {"obstacle", "wall presses with 25 N", "post presses with 17 N at 2 points", "touches floor", "force"}
     assert told <= set(rows)
     commands = [umsgpack.unpackb(one) for one in scene_of(text)[1]]
     placed = {
@@ -142,7 +143,7 @@ def test_figures_show_them_too(arm: sr.SoftModel) -> None:
     held = leaning(arm)
     (axes,) = loaded_shape(held).axes
     _, labels = axes.get_legend_handles_labels()
-    assert {"obstacle", "wall pushes with 25 N", "post pushes with 16.3 N", "touches floor"} <= set(labels)
+    assert {"obstacle", "wall presses with 25 N", "post presses with 17 N at 2 points", "touches floor"} <= set(labels)
     points = [np.ravel(line.get_data_3d()) for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata()) == 1]
     assert np.allclose(points, [contact.point for contact in held.contacts], atol=1e-12)
     shafts = [np.array(one._segments3d[0]) for one in axes.collections if hasattr(one, "_segments3d")]
@@ -155,3 +156,15 @@ def test_obstacles_of_the_same_surroundings_are_made_once(arm: sr.SoftModel) -> 
     builder, held = SceneBuilder(arm), leaning(arm)
     assert builder.loaded(held).obstacles is builder.loaded(leaning(arm)).obstacles
     assert builder.relaxed().obstacles == ()
+
+
+def test_live_targets_are_reached_while_leaning(arm: sr.SoftModel) -> None:
+    """A target at the wall, where the link of 55 mm touches it at 1 m; and back, where it does not."""
+    wall = Environment([HalfSpace((-1, 0, 0), offset=-1.0, name="wall")])
+    start = sr.solve_equilibrium(arm, (0.0, 0.9, -0.4), (0, 0, -20), environment=wall)
+    there = next_solution(start, (0.945, 0.1, 0.7), (0, 0, -20)).equilibrium
+    assert np.allclose(there.tip_position, (0.945, 0.1, 0.7), atol=1e-8)
+    assert [contact.obstacle for contact in there.contacts] == ["wall"]
+    back = next_solution(there, (0.8, 0.1, 0.7), (0, 0, -20)).equilibrium
+    assert back.contacts == ()
+    assert back.load.environment == wall

@@ -84,11 +84,11 @@ def test_an_arm_leans_on_the_obstacles_that_are_given(arm: sr.SoftModel) -> None
         leaning = page.set(force=(0, 0, -20))
         assert leaning.tip_position[0] == pytest.approx(0.945, abs=1e-9)
         (contact,) = leaning.contacts
-        assert f"wall pushes with {contact.normal_force:.3g} N" in panel_html(page)
+        assert f"wall presses with {contact.normal_force:.3g} N" in panel_html(page)
         drawn = page._drawing.handles[f"contacts/{contact.link}/wall/0"]
         assert np.allclose(drawn.position, contact.point, atol=1e-6)
         assert page.set(force=(0, 0, 0)).contacts == ()
-        assert "wall pushes" not in panel_html(page)
+        assert "wall presses" not in panel_html(page)
 
 
 def test_muscles_and_robots_without_motors() -> None:

@@ -77,35 +77,34 @@ def legend(
 
 
 def contact_entries(states: Sequence[Mapping[str, DrawnContact]]) -> list[LegendEntry]:
-    """Return the contacts of some states of a robot: the size of the force of each obstacle on it, of many their range.
+    """Return the contacts of some states of a robot: the sum of the forces of each obstacle, of many obstacles their range.
 
     Args:
         states: The contacts in each state.
     """
     names = dict.fromkeys(one.obstacle for state in states for one in state.values())
-    if not names:
-        return []
-    forces = {name: [_force_of(name, state) for state in states] for name in names}
+    forces = {name: [_pressing(name, state) for state in states] for name in names}
     if len(names) > _MOST_NAMED:
-        forces = {f"each of {len(names)} obstacles": [force for some in forces.values() for force in some]}
-    entries = [LegendEntry(CONTACT_COLOUR, _push(name, some)) for name, some in forces.items()]
-    if len(states) == 1:
-        slipping = dict.fromkeys(one.obstacle for one in states[0].values() if one.status == "slips")
-        entries += [LegendEntry(CONTACT_COLOUR, f"{name} slips") for name in slipping]
-    return entries
+        forces = {f"each of {len(names)} obstacles": [one for some in forces.values() for one in some]}
+    slipping = {one.obstacle for one in states[0].values() if one.status == "slips"} if len(states) == 1 else set()
+    return [LegendEntry(CONTACT_COLOUR, _words_of_contact(name, some, name in slipping)) for name, some in forces.items()]
 
 
-def _force_of(obstacle: str, contacts: Mapping[str, DrawnContact]) -> float:
-    """Size of the force of an obstacle on a robot [N]."""
-    return float(np.linalg.norm(sum((one.force for one in contacts.values() if one.obstacle == obstacle), np.zeros(3))))
+def _pressing(obstacle: str, contacts: Mapping[str, DrawnContact]) -> tuple[float, int]:
+    """Sum of the sizes of the forces of an obstacle on a robot [N], and the number of points."""
+    sizes = [float(np.linalg.norm(one.force)) for one in contacts.values() if one.obstacle == obstacle]
+    return sum(sizes), len(sizes)
 
 
-def _push(obstacle: str, forces: Sequence[float]) -> str:
-    """The least and the most force of an obstacle in words [N]."""
-    least, most = (f"{number:.3g}" for number in (min(forces), max(forces)))
+def _words_of_contact(obstacle: str, pressing: Sequence[tuple[float, int]], slips: bool) -> str:
+    """What an obstacle does in some states, in words."""
+    forces = [force for force, _ in pressing]
     if max(forces) <= _NO_FORCE:
         return f"touches {obstacle}"
-    return f"{obstacle} pushes with {least if least == most else f'{least} to {most}'} N"
+    least, most = (f"{number:.3g}" for number in (min(forces), max(forces)))
+    words = f"{obstacle} presses with {least if least == most else f'{least} to {most}'} N"
+    points = pressing[0][1]
+    return words + f" at {points} points" * (len(pressing) == 1 and points > 1) + ", slips" * slips
 
 
 def tension_entries(states: Sequence[Sequence[DrawnActuator]]) -> list[LegendEntry]:

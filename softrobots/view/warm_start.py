@@ -40,7 +40,7 @@ def next_equilibrium(last: Equilibrium, q_motors: Any, force: Any = None, *, gra
 
 
 def next_solution(last: Equilibrium, target: Any, force: Any = None, *, gravity: Any = None) -> IkSolution:
-    """Solve the inverse kinematics of the loaded tip starting from another equilibrium.
+    """Solve the inverse kinematics of the loaded tip starting from another equilibrium, among its obstacles.
 
     Args:
         last: The equilibrium to start from.
@@ -57,9 +57,10 @@ def next_solution(last: Equilibrium, target: Any, force: Any = None, *, gravity:
         TargetUnreachable: If no search reaches the target.
         EquilibriumNotFound: If there is no equilibrium at any of the starts.
     """
+    given = {"gravity": gravity, "environment": last.load.environment}
     low, high = last.model.motor_limits.T
     start = last.q_motors if np.all((last.q_motors >= low) & (last.q_motors <= high)) else None
     try:
-        return solve_ik(last.model, target, force, gravity=gravity, q_motors0=start, starts=1)
+        return solve_ik(last.model, target, force, q_motors0=start, starts=1, **given)
     except (TargetUnreachable, EquilibriumNotFound):
-        return solve_ik(last.model, target, force, gravity=gravity, q_motors0=start, starts=_STARTS)
+        return solve_ik(last.model, target, force, q_motors0=start, starts=_STARTS, **given)
