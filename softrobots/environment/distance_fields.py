@@ -18,6 +18,7 @@ from softrobots.core.checks import FloatArray
 ON_BORDER = 1e-9
 """Distance beyond a face, over that from the body, below which a point belongs to the face; exact at crossed borders."""
 _TINY = 1e-300
+_RADIAL, _AXIS = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
 _NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
 _PRODUCTS = np.cross(np.eye(3)[:, None], np.eye(3)).swapaxes(1, 2).reshape(3, 9)  # of the axes
 
@@ -36,7 +37,7 @@ class Field(Protocol):
         """Distance, shape (m,) [m], and normal, shape (m, 3), at points, shape (m, 3)."""
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
-        """Two directions across the normal, shape (m, 2, 3), and the curvature of `phi` along each, shape (m, 2) [1/m]."""
+        r"""Directions `a`, shape (m, k, 3), and weights `c`, shape (m, k) [1/m]: :math:`H = \sum_k c_k\, a_k a_k^T`."""
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Shares `s` of the way, shape (m, k), where `start + s span` crosses between features; any number if it does not."""
@@ -76,7 +77,7 @@ class HalfSpaces(NamedTuple):
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Zero: planes."""
-        return np.zeros((len(points), 2, 3)), np.zeros((len(points), 2))
+        return np.zeros((len(points), 0, 3)), np.zeros((len(points), 0))
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """None: one face."""
@@ -97,47 +98,43 @@ class RoundedBoxes(NamedTuple):
 
     def _beyond(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Points in the axes of the bodies, how far they are beyond the faces, and the distance from the box."""
-        local = ((points - self.centres[which])[..., None, :] @ self.rotations[which])[..., 0, :]
-        beyond = np.abs(local) - self.halves[which]
+        local = ((points - self.centres.take(which, 0))[..., None, :] @ self.rotations.take(which, 0))[..., 0, :]
+        beyond = np.abs(local) - self.halves.take(which, 0)
         outside = np.maximum(beyond, 0.0)
-        return local, beyond, np.sqrt((outside * outside).sum(axis=-1))
+        return local, beyond, np.sqrt(np.einsum("...i,...i", outside, outside))
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of each point from each body."""
-        _, beyond, outside = self._beyond(points[:, None, :], slice(None))
+        _, beyond, outside = self._beyond(points[:, None, :], np.arange(len(self.radii)))
         return np.asarray(outside + np.minimum(beyond.max(axis=-1), 0.0) - self.radii)
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance and normal."""
         local, beyond, outside = self._beyond(points, which)
-        deepest = beyond.argmax(axis=1)
-        rows = np.arange(len(points))
-        within = outside < _TINY
-        normal = np.maximum(beyond, 0.0) / np.where(within, 1.0, outside)[:, None]
-        normal[rows[within], deepest[within]] = 1.0
-        normal *= np.where(local < 0.0, -1.0, 1.0)
-        distance = outside + np.minimum(beyond[rows, deepest], 0.0) - self.radii[which]
-        return distance, (self.rotations[which] @ normal[..., None])[..., 0]
+        normal = np.maximum(beyond, 0.0) / np.maximum(outside, _TINY)[:, None]
+        distance = outside - self.radii.take(which)
+        within = (outside < _TINY).nonzero()[0]
+        if len(within):
+            deepest = beyond[within].argmax(axis=1)
+            normal[within, deepest] = 1.0
+            distance[within] += beyond[within, deepest]
+        normal = np.copysign(normal, local)
+        return distance, (self.rotations.take(which, 0) @ normal[..., None])[..., 0]
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
-        """The same along both directions at a vertex or round end, zero along edge or axis, zero at faces."""
+        """One over the distance, in the coordinates that are beyond faces and across the normal; zero at faces."""
         local, beyond, outside = self._beyond(points, which)
-        beyond = np.where(self.halves[which] > 0.0, beyond, np.inf)
-        curved = beyond > ON_BORDER * outside[:, None]
-        count = curved.sum(axis=1) * (outside > _TINY)
-        normal = np.maximum(np.abs(local) - self.halves[which], 0.0) * np.where(local < 0.0, -1.0, 1.0)
-        normal /= np.maximum(outside, _TINY)[:, None]
-        straight = np.eye(3)[np.where(curved, np.abs(normal), -1.0).argmin(axis=1)]  # the edge, or the axis most across
-        first = cross(straight, normal)
-        first /= np.maximum(np.sqrt((first * first).sum(axis=1)), _TINY)[:, None]
-        directions = np.stack([first, cross(normal, first)], axis=1)
-        curvatures = (count[:, None] > [1, 2]) / np.maximum(outside, _TINY)[:, None]
-        return directions @ np.swapaxes(self.rotations[which], 1, 2), np.where(count[:, None] > [1, 2], curvatures, 0.0)
+        curved = (beyond > ON_BORDER * outside[:, None]) | (self.halves.take(which, 0) == 0.0)
+        size = np.where((curved.sum(axis=1) > 1) & (outside > _TINY), 1.0 / np.maximum(outside, _TINY), 0.0)[:, None]
+        rotations = self.rotations.take(which, 0)
+        normal = np.maximum(beyond, 0.0) * np.where(local < 0.0, -size, size)
+        directions = np.concatenate([rotations.swapaxes(1, 2), (rotations @ normal[:, :, None]).swapaxes(1, 2)], axis=1)
+        return directions, np.concatenate([curved * size, -size], axis=1)
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where the coordinates pass the faces."""
-        rotations, halves = self.rotations[which], self.halves[which]
-        local = ((starts - self.centres[which])[:, None, :] @ rotations)[:, 0]
+        rotations, halves = self.rotations.take(which, 0), self.halves.take(which, 0)
+        local = ((starts - self.centres.take(which, 0))[:, None, :] @ rotations)[:, 0]
         along = (spans[:, None, :] @ rotations)[:, 0]
         along = np.where((halves > 0.0) & (np.abs(along) > _TINY), along, np.inf)
         return np.concatenate([(halves - local) / along, (-halves - local) / along], axis=1)
@@ -157,14 +154,15 @@ class Cylinders(NamedTuple):
 
     def _beyond(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Points in the axes of the bodies, distances from the axis, and how far they are beyond side and ends, (..., 2)."""
-        local = ((points - self.centres[which])[..., None, :] @ self.rotations[which])[..., 0, :]
+        local = ((points - self.centres.take(which, 0))[..., None, :] @ self.rotations.take(which, 0))[..., 0, :]
         from_axis = np.hypot(local[..., 0], local[..., 1])
-        beyond = np.stack([from_axis - self.radii[which], np.abs(local[..., 2]) - self.halves[which]], axis=-1)
-        return local, from_axis, beyond, np.hypot(*np.moveaxis(np.maximum(beyond, 0.0), -1, 0))
+        beyond = np.stack([from_axis - self.radii.take(which), np.abs(local[..., 2]) - self.halves.take(which)], axis=-1)
+        outside = np.maximum(beyond, 0.0)
+        return local, from_axis, beyond, np.sqrt(np.einsum("...i,...i", outside, outside))
 
     def distance(self, points: FloatArray) -> FloatArray:
         """Distance of each point from each body."""
-        _, _, beyond, outside = self._beyond(points[:, None, :], slice(None))
+        _, _, beyond, outside = self._beyond(points[:, None, :], np.arange(len(self.radii)))
         return np.asarray(outside + np.minimum(beyond.max(axis=-1), 0.0))
 
     def _slopes(self, beyond: FloatArray, outside: FloatArray) -> FloatArray:
@@ -179,29 +177,29 @@ class Cylinders(NamedTuple):
         normal = local * (slopes[:, 0] / np.maximum(from_axis, _TINY))[:, None]
         normal[:, 0] += slopes[:, 0] * (from_axis < _TINY)  # on the axis: any direction across
         normal[:, 2] = np.where(local[:, 2] < 0.0, -slopes[:, 1], slopes[:, 1])
-        return outside + np.minimum(beyond.max(axis=1), 0.0), (self.rotations[which] @ normal[..., None])[..., 0]
+        return outside + np.minimum(beyond.max(axis=1), 0.0), (self.rotations.take(which, 0) @ normal[..., None])[..., 0]
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
-        """Around the axis, and across the rim."""
+        """Around the axis at side and rim, and across the rim."""
         local, from_axis, beyond, outside = self._beyond(points, which)
         slopes = self._slopes(beyond, outside)
-        across = np.zeros_like(local)
-        across[:, 0], across[:, 1] = -local[:, 1], local[:, 0]
-        across[from_axis < _TINY, 1] = 1.0
-        across /= np.maximum(from_axis, 1.0 * (from_axis < _TINY))[:, None]
-        outward = cross(across, np.broadcast_to([0.0, 0.0, 1.0], across.shape))
-        upward = np.where(local[:, 2] < 0.0, -1.0, 1.0)
+        rotations = self.rotations.take(which, 0)
+        outward = (local * _RADIAL) / np.maximum(from_axis, _TINY)[:, None]
+        outward[:, 0] += from_axis < _TINY
+        normal = slopes[:, :1] * outward
+        normal[:, 2] = np.where(local[:, 2] < 0.0, -slopes[:, 1], slopes[:, 1])
+        around = np.stack([-outward[:, 1], outward[:, 0], outward[:, 2]], axis=1)
+        axes = np.broadcast_to(_AXIS, outward.shape)
+        across = np.where(outside > _TINY, slopes[:, 0] / np.maximum(from_axis, _TINY), 0.0)
         rim = (beyond > ON_BORDER * outside[:, None]).all(axis=1) & (outside > _TINY)
-        over = -slopes[:, 1:] * outward
-        over[:, 2] = slopes[:, 0] * upward
-        around = np.where(outside > _TINY, slopes[:, 0] / np.maximum(from_axis, _TINY), 0.0)
-        curvatures = np.stack([around, np.where(rim, 1.0 / np.maximum(outside, _TINY), 0.0)], axis=1)
-        return np.stack([across, over], axis=1) @ np.swapaxes(self.rotations[which], 1, 2), curvatures
+        size = np.where(rim, 1.0 / np.maximum(outside, _TINY), 0.0)
+        directions = np.stack([around, outward, axes, normal], axis=1) @ rotations.swapaxes(1, 2)
+        return directions, np.stack([across, size, size, -size], axis=1)
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where it passes the planes of the ends, and the side."""
-        rotations, half, radius = self.rotations[which], self.halves[which], self.radii[which]
-        local = ((starts - self.centres[which])[:, None, :] @ rotations)[:, 0]
+        rotations, half, radius = self.rotations.take(which, 0), self.halves.take(which), self.radii.take(which)
+        local = ((starts - self.centres.take(which, 0))[:, None, :] @ rotations)[:, 0]
         along = (spans[:, None, :] @ rotations)[:, 0]
         rise = np.where(np.abs(along[:, 2]) > _TINY, along[:, 2], np.inf)
         square = along[:, 0] ** 2 + along[:, 1] ** 2

@@ -184,15 +184,16 @@ class Gaps:
         """Append the terms of the candidates of one field."""
         points, normals = self.core_points[rows], self.normals[rows]
         directions, curvatures = field.curvature(points, which)
-        for place in (0, 1):
-            bent = np.flatnonzero(curvatures[:, place])
-            found.append(self._rows(rows[bent], directions[bent, place], points[bent], 0.0))
-            weights.append(forces[bent] * curvatures[bent, place])
+        bent, place = curvatures.nonzero()
+        if not len(bent):
+            return
+        found.append(self._rows(rows[bent], directions[bent, place], points[bent], 0.0))
+        weights.append(forces[bent] * curvatures[bent, place])
         spans = self.places.spans[self.capsules[rows]]
         parts = curvatures * (directions @ spans[:, :, None])[:, :, 0]
         pulls = (parts[:, :, None] * directions).sum(axis=1)  # H t
         bend = (pulls * spans).sum(axis=1)
-        slides = np.flatnonzero((self.features[rows] == INSIDE) & (bend > 0.0))
+        slides = ((self.features[rows] == INSIDE) & (bend > 0.0)).nonzero()[0]
         couples = cross(spans, normals)[slides]
         found.append(self._rows(rows[slides], pulls[slides], points[slides], couples))
         weights.append(-forces[slides] / bend[slides])

@@ -18,6 +18,10 @@ _ROUND = 0.1
 """The same, above which a minimum stands for a border of its feature that is nearer than half the distance."""
 
 
+_NARROW = 1e-15
+_BOTH = np.array([0, 1])
+
+
 class CorePoints(NamedTuple):
     """Candidates of contact inside of cores."""
 
@@ -31,6 +35,9 @@ class CorePoints(NamedTuple):
     """Their distances from the bodies, shape (m,) [m]."""
     normals: FloatArray
     """Normals, shape (m, 3)."""
+
+
+NO_POINTS = CorePoints(*(np.zeros(0, dtype=np.intp),) * 2, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
 
 
 def core_points(
@@ -52,48 +59,59 @@ def core_points(
     Returns:
         The candidates.
     """
-    count = len(which)
-    length = np.sqrt((spans * spans).sum(axis=1))
+    length = np.sqrt(np.einsum("ij,ij->i", spans, spans))
     borders = field.borders(starts, spans, which)
     crossed = (borders > 0.0) & (borders < 1.0)
-    used = np.flatnonzero(crossed.any(axis=0))
-    borders = np.where(crossed, borders, 1.0)[:, used]
-    order = borders.argsort(axis=1)
-    shares = np.concatenate([np.zeros((count, 1)), np.take_along_axis(borders, order, axis=1), np.ones((count, 1))], axis=1)
+    used = np.asarray(crossed.any(axis=0)).nonzero()[0]
+    shares = np.zeros((len(which), len(used) + 2))
+    shares[:, -1] = 1.0
+    order = np.where(crossed, borders, 1.0).take(used, 1).argsort(axis=1)
+    shares[:, 1:-1] = np.take_along_axis(np.where(crossed, borders, 1.0).take(used, 1), order, 1)
     points = starts[:, None] + shares[:, :, None] * spans[:, None]
-    flat = field.at(points.reshape(-1, 3), np.repeat(which, shares.shape[1]))
+    flat = field.at(points.reshape(-1, 3), which.repeat(shares.shape[1]))
     distances, normals = flat[0].reshape(shares.shape), flat[1].reshape(points.shape)
-    slopes = (normals * spans[:, None]).sum(axis=2) / length[:, None]
+    slopes = np.einsum("ijk,ik->ij", normals, spans) / length[:, None]
+    ways = shares[:, 1:-1] * length[:, None]
+    keep = (ways > merged) & (ways < length[:, None] - merged) & (distances[:, 1:-1] <= limits[:, None])
 
-    rows = np.flatnonzero((slopes[:, 0] < 0.0) & (slopes[:, -1] > 0.0))
-    place = (slopes[rows] < 0.0).sum(axis=1) - 1
-    ends = np.stack([place, place + 1], axis=1)
-    bracket, across_ends = shares[rows[:, None], ends], slopes[rows[:, None], ends]
-    reach = across_ends * (distances[rows[:, None], ends] + field.radii[which[rows], None])
-    share, minimum, normal, bend = _minimum(field, which[rows], starts[rows], spans[rows], bracket, across_ends, reach)
-    keep = (shares[:, 1:-1] * length[:, None] > merged) & ((1.0 - shares[:, 1:-1]) * length[:, None] > merged)
-    keep &= distances[:, 1:-1] <= limits[:, None]
-    standing = np.maximum(minimum, 0.0)
-    for shift in (-1, 0) if len(used) else ():  # the borders before and after the minimum
-        border = np.clip(place + shift, 0, len(used) - 1)
-        apart = np.abs(shares[rows, border + 1] - share) * length[rows]
-        represented = (apart <= merged) | ((apart <= 0.5 * standing) & (bend * standing > _ROUND))
-        keep[rows[represented], border[represented]] = False
-    found = (bend * standing > _PARALLEL) | (minimum <= 0.0)
-    found &= (share * length[rows] > merged) & ((1.0 - share) * length[rows] > merged) & (minimum <= limits[rows])
-
-    pairs, columns = np.nonzero(keep)
-    return CorePoints(
-        np.concatenate([rows[found], pairs]),
-        np.concatenate([np.zeros(int(found.sum()), dtype=np.intp), 1 + used[order[pairs, columns]]]),
-        np.concatenate([starts[rows[found]] + share[found, None] * spans[rows[found]], points[pairs, columns + 1]]),
-        np.concatenate([minimum[found], distances[pairs, columns + 1]]),
-        np.concatenate([normal[found], normals[pairs, columns + 1]]),
-    )
+    found = NO_POINTS
+    rows = ((slopes[:, 0] < 0.0) & (slopes[:, -1] > 0.0)).nonzero()[0]
+    if len(rows):
+        place = (slopes.take(rows, 0) < 0.0).sum(axis=1) - 1
+        entries = (rows * shares.shape[1] + place)[:, None] + _BOTH
+        tables = (column.ravel().take(entries) for column in (shares, slopes, distances))
+        bodies, begins, ways = which.take(rows), starts.take(rows, 0), spans.take(rows, 0)
+        share, distance, normal, bend = _minimum(field, bodies, begins, ways, length.take(rows), *tables)
+        round_here = bend * np.maximum(distance, 0.0)
+        for border in (place - 1, place) if len(used) else ():  # before and after the minimum
+            at = np.minimum(np.maximum(border, 0), len(used) - 1)
+            apart = np.abs(shares[rows, at + 1] - share) * length.take(rows)
+            stands = (apart <= merged) | ((apart <= 0.5 * distance) & (round_here > _ROUND))
+            keep[rows, at] &= ~stands
+        way, limit = share * length.take(rows), limits.take(rows)
+        unique = (way > merged) & (way < length.take(rows) - merged) & ((round_here > _PARALLEL) | (distance <= 0.0))
+        good = (unique & (distance <= limit)).nonzero()[0]
+        points_there = (begins + share[:, None] * ways).take(good, 0)
+        zeros = np.zeros(len(good), dtype=np.intp)
+        found = CorePoints(rows.take(good), zeros, points_there, distance.take(good), normal.take(good, 0))
+    pairs, columns = keep.nonzero()
+    if not len(pairs):
+        return found
+    features = 1 + used[order[pairs, columns]]
+    columns = columns + 1
+    crossings = CorePoints(pairs, features, points[pairs, columns], distances[pairs, columns], normals[pairs, columns])
+    return CorePoints(*(np.concatenate(both) for both in zip(found, crossings, strict=True))) if len(found.pairs) else crossings
 
 
 def _minimum(
-    field: Field, which: Any, starts: FloatArray, spans: FloatArray, bracket: FloatArray, slopes: FloatArray, reach: FloatArray
+    field: Field,
+    which: Any,
+    starts: FloatArray,
+    spans: FloatArray,
+    length: FloatArray,
+    shares: FloatArray,
+    slopes: FloatArray,
+    distances: FloatArray,
 ) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     """Find the minimum along each core by Newton steps within a bracket of its share, by bisection where they leave it.
 
@@ -102,32 +120,32 @@ def _minimum(
         which: Body of each core, shape (m,).
         starts: Starts of the cores, shape (m, 3) [m].
         spans: From start to end of the cores, shape (m, 3) [m].
-        bracket: Shares of the core between which the slope changes sign, shape (m, 2).
+        length: Their lengths, shape (m,) [m].
+        shares: Shares of the core between which the slope changes sign, shape (m, 2).
         slopes: Slopes there, shape (m, 2).
-        reach: Slopes times distances from the features there: where the feature is a point or line, linear between, (m, 2).
+        distances: Distances there, shape (m, 2) [m].
 
     Returns:
         Share, distance [m], normal and curvature of the distance along the core [1/m] at the minimum.
     """
-    length = np.sqrt((spans * spans).sum(axis=1))
     along = spans / length[:, None]
-    lower, upper = bracket.T.copy()
-    guess = reach if np.all(reach[:, 1] > reach[:, 0]) else slopes
+    lower, upper = shares.T.copy()
+    # slope times distance from a corner or a straight edge is linear along the core
+    guess = slopes * (distances + field.radii.take(which)[:, None])
+    if not (guess[:, 1] > guess[:, 0]).all():
+        guess = slopes
     share = lower - (upper - lower) * guess[:, 0] / (guess[:, 1] - guess[:, 0])
-    best = share, np.zeros(len(which)), np.zeros_like(starts), np.zeros(len(which))
-    for _ in range(_MAX_ITERATIONS if len(which) else 0):
+    for _ in range(_MAX_ITERATIONS):
         points = starts + share[:, None] * spans
         distance, normal = field.at(points, which)
-        slope = (normal * along).sum(axis=1)
-        directions, curvatures = field.curvature(points, which)
-        bend = (curvatures * (directions @ along[:, :, None])[:, :, 0] ** 2).sum(axis=1)
-        best = share, distance, normal, bend
+        slope = np.einsum("ij,ij->i", normal, along)
+        directions, weights = field.curvature(points, which)
+        bend = np.einsum("ij,ij->i", weights, (directions @ along[:, :, None])[:, :, 0] ** 2)
         lower, upper = np.where(slope < 0.0, share, lower), np.where(slope > 0.0, share, upper)
-        open_rows = (np.abs(slope) > _SLOPE) & (upper - lower > 1e-15)
-        if not open_rows.any():
+        waiting = (np.abs(slope) > _SLOPE) & (upper - lower > _NARROW)
+        if not waiting.any():
             break
-        step = np.where(bend > 0.0, -slope / (np.where(bend > 0.0, bend, 1.0) * length), np.inf)
-        trial = share + step
-        trial = np.where((trial > lower) & (trial < upper), trial, 0.5 * (lower + upper))
-        share = np.where(open_rows, trial, share)
-    return best
+        trial = share - slope / (np.where(bend > 0.0, bend, np.inf) * length)
+        trial = np.where((bend > 0.0) & (trial > lower) & (trial < upper), trial, 0.5 * (lower + upper))
+        share = np.where(waiting, trial, share)
+    return share, distance, normal, bend

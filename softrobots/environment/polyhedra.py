@@ -44,7 +44,7 @@ class Polyhedra:
         return np.array([one.distance for one in found]), np.array([one.normal for one in found]).reshape(-1, 3)
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
-        """Zero at faces, across the edge at an edge, the same along both directions at a corner."""
+        """Zero at faces, across the edge at an edge, the same in both directions across the normal at a corner."""
         directions, curvatures = np.zeros((len(points), 2, 3)), np.zeros((len(points), 2))
         for row, (point, body) in enumerate(zip(points, which.tolist(), strict=True)):
             near = self._nearest(point, body)
