@@ -69,8 +69,10 @@ def contact_step(
         relative = relative + damping * np.eye(len(soft))
     convex, shift, exact = _convex(relative, gaps, gradients, held, factors)
     found = _solve(convex, pull + shift, gradients, -gaps)
-    if found is not None and shift.any() and not np.array_equal(found[1] > 0.0, held):  # other contacts are pressed
-        exact, found = False, _solve(convex, pull, gradients, -gaps)
+    if found is not None and shift.any():
+        lost = 2.0 * float(found[1].sum()) * max(-float(gaps.min(initial=0.0)), 0.0)
+        if not np.array_equal(found[1] > 0.0, held) or float(pull @ found[0]) > lost:  # other contacts are pressed, or uphill
+            exact, found = False, _solve(convex, pull, gradients, -gaps)
     if found is None or np.linalg.norm(soft * found[0]) > longest:
         exact, found = False, _within(convex, pull, gradients, gaps, longest / soft)
     if found is None or not np.isfinite(found[0]).all():

@@ -66,12 +66,24 @@ class ForceTable(NamedTuple):
     forces: FloatArray
     """Their normal forces [N]."""
 
-    def at(self, keys: Sequence[Any]) -> FloatArray:
-        """Forces on other candidates, shape (m,) [N]; zero on new ones."""
-        if keys == self.keys:
+    def at(self, gaps: Gaps) -> FloatArray:
+        """Forces on other candidates, shape (m,) [N]; zero on new ones.
+
+        The force on a candidate that is no longer there passes to the nearest other one of the same pair of bodies.
+        """
+        if gaps.keys == self.keys:
             return self.forces
-        known = dict(zip(self.keys, self.forces.tolist(), strict=True))
-        return np.array([known.get(key, 0.0) for key in keys], dtype=np.float64)
+        forces, places = np.zeros(len(gaps.keys)), {key: place for place, key in enumerate(gaps.keys)}
+        for key, force in zip(self.keys, self.forces.tolist(), strict=True):
+            if force > 0.0:
+                place = places.get(key)
+                if place is None:
+                    pair = np.flatnonzero((gaps.capsules == key[0]) & (gaps.obstacles == key[1]))
+                    if not len(pair):
+                        continue
+                    place = pair[int(gaps.values[pair].argmin())]
+                forces[place] += force
+        return forces
 
 
 NO_FORCES = ForceTable((), np.zeros(0))
@@ -89,7 +101,7 @@ class NearSurfaces:
         """Evaluate gaps and contact load at Pinocchio's configuration, shape (nq,), and the point of the coordinates there."""
         gaps = self._surroundings.at(q, self._margin)
         on_motors, on_springs = point.columns(gaps.jacobian)
-        each = forces.at(gaps.keys)
+        each = forces.at(gaps)
         return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._surroundings)
 
 
