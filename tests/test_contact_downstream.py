@@ -13,6 +13,7 @@ from hypothesis import given, settings
 
 import softrobots as sr
 from softrobots.environment.environment import Environment
+from softrobots.environment.gaps import Surroundings
 from softrobots.environment.obstacles import Box, HalfSpace, Sphere
 from softrobots.statics.contact.contact_sensitivity import ContactSensitivity
 from softrobots.statics.kinematics import frame_placement
@@ -153,6 +154,74 @@ def test_a_known_obstacle_is_told_from_the_force_at_the_tip() -> None:
     assert np.abs(normal_forces(estimate.equilibrium) - normal_forces(found)).max() < 1e-7
     free = sr.estimate_load(arm, found.q_motors, found.motor_torques, gravity=sr.EARTH_GRAVITY)
     assert np.linalg.norm(free.force - FORCE) > 1.0  # without the obstacle it would be another one
+
+
+# --- Inverse kinematics
+
+
+def assert_leaning(found: sr.Equilibrium, reach: float = 1.2) -> None:
+    """The conditions of Karush, Kuhn and Tucker, and the same robot from rest."""
+    assert found.converged
+    for one in found.contacts:
+        assert one.normal_force >= 0.0
+        assert abs(one.gap) <= (1e-12 if one.strict else 1e-9) * reach
+    gaps = Surroundings(found.model, found.environment).at(found.q, 0.3 * reach).values
+    assert gaps.min(initial=0.0) >= -1e-12 * reach
+    load = {"wrench": dict(found.load.wrenches), "gravity": found.load.gravity, "environment": found.environment}
+    again = sr.solve_equilibrium(found.model, found.q_motors, **load)
+    assert np.abs(again.q_springs - found.q_springs).max() < 1e-9
+
+
+@pytest.mark.parametrize("name", ["wall", "wall and prop"])
+def test_a_target_is_reached_while_leaning(name: str) -> None:
+    """The pose of an arm on its obstacles is found again from other motors: its tip can only be there in contact."""
+    held = leaning(name)
+    options = {"gravity": sr.EARTH_GRAVITY, "environment": held.environment}
+    found = sr.solve_ik(held.model, held.tip_position, FORCE, q_motors0=MOTORS + (0.1, -0.1, 0.1), **options)
+    assert found.error < 1e-9
+    assert "half_space_1" in [one.obstacle for one in found.equilibrium.contacts]
+    assert_leaning(found.equilibrium)
+
+
+def test_a_target_behind_a_wall_is_out_of_reach_by_its_depth() -> None:
+    """The nearest point is on the wall, where the tip is its radius away: the error is the depth of the target."""
+    held = leaning("wall")
+    normal = np.array(WALL.normal) / np.linalg.norm(WALL.normal)
+    with pytest.raises(sr.TargetUnreachable) as caught:
+        sr.solve_ik(
+            held.model, held.tip_position - 0.02 * normal, FORCE, q_motors0=MOTORS, starts=1, environment=held.environment
+        )
+    assert caught.value.residual == pytest.approx(0.02, rel=1e-3)
+    assert_leaning(caught.value.best.equilibrium)
+
+
+def test_a_path_along_a_wall_is_slid_and_one_off_it_leaves_it() -> None:
+    """Along the wall every waypoint is reached in contact; the other path begins there, and the second waypoint is free."""
+    held = leaning("wall")
+    normal = np.array(WALL.normal) / np.linalg.norm(WALL.normal)
+    along = np.cross((0.0, 0.0, 1.0), normal) / np.linalg.norm(np.cross((0.0, 0.0, 1.0), normal))
+    options = {"gravity": sr.EARTH_GRAVITY, "environment": held.environment, "q_motors0": MOTORS}
+    for direction, pressed in ((along, True), (normal, False)):
+        steps = np.linspace(0.0, 0.2 if direction @ (0.0, -1.0, 0.0) > 0.0 else -0.2, 5) if pressed else np.linspace(0, 0.1, 5)
+        targets = held.tip_position + steps[:, None] * direction
+        path = sr.follow_trajectory(held.model, targets, FORCE, **options)
+        assert path.tip_error.max() < 1e-9
+        forces = path.contact_forces["half_space_1"]
+        assert forces[0] == pytest.approx(held.contacts[0].normal_force, rel=1e-9)
+        assert (forces[1:].min() > 1.0) if pressed else (forces[1:] == 0.0).all()
+        for found in path.equilibria:
+            assert_leaning(found)
+
+
+def test_a_workspace_stays_among_its_obstacles(tmp_path: Path) -> None:
+    """No tip is inside of the wall or nearer than its radius; the file brings it back."""
+    arm = sr.load_model(sr.InflatableArm())
+    space = sr.sample_workspace(arm, 40, force=FORCE, environment=Environment([WALL]))
+    normal = np.array(WALL.normal) / np.linalg.norm(WALL.normal)
+    assert (space.tip_positions @ normal).min() >= WALL.offset + 0.055 - 1e-9
+    again = sr.load_result(sr.save_result(space, tmp_path / "space.npz"))
+    assert again.load.environment == space.load.environment
+    assert np.array_equal(again.tip_positions, space.tip_positions)
 
 
 # --- Modes

@@ -84,10 +84,11 @@ def solve_ik(
     """Find actuator coordinates (motor angles, muscle lengths) that put the loaded tip at a target position.
 
     Searches from `q_motors0` and from random coordinates within the limits (always the same ones), and returns, of the
-    solutions found, the one that changes `q_motors0` least. Of a robot with more actuators than the target has
-    conditions the change is minimal; if it has muscles, the first search that succeeds decides. Where muscles cannot both pull
-    and push (a least tension of zero or more), the limits of all tensions are kept, too, and redundant ones get the least
-    tension instead: a minimum of the sum of squares beyond their pretension (`statics.tip_steps`).
+    solutions found, the one that changes `q_motors0` least. Of a robot with more actuators than the target has conditions
+    the change is minimal; if it has muscles, the first search that succeeds decides, as it does among obstacles. Where
+    muscles cannot both pull and push (a least tension of zero or more), the limits of all tensions are kept, too, and
+    redundant ones get the least tension instead: a minimum of the sum of squares beyond their pretension
+    (`statics.tip_steps`).
 
     For full poses of a robot with a spherical wrist the arm first puts the centre of the wrist in place, and the wrist starts
     in the orientation, with both of its solutions (`statics.spherical_wrist`).
@@ -140,13 +141,14 @@ def solve_ik(
     tip = LoadedTip(model, goal, load, method)
     ended: list[LocalSolution[ElasticState]] = []
     begins = _starts(model, first, positive_integer("starts", starts, 10_000))
+    first_decides = environment is not None or bool(model.muscles and freedom > goal.rows)
     wrist = spherical_wrist(model) if goal.rows == 6 else None
     for tried in [begins] if wrist is None else [[first, *wrist.starts(tip, begins)], begins[1:]]:
         for start in tried:
             local = search(tip, start, model.rest, home=first, tolerance=tolerance)
             if local is not None:
                 ended.append(local)
-                if model.muscles and freedom > goal.rows and local.arrived(tolerance) and allowed(local):
+                if first_decides and local.arrived(tolerance) and allowed(local):
                     break
         if any(local.arrived(tolerance) and allowed(local) for local in ended):
             break

@@ -13,13 +13,14 @@ from softrobots.core.errors import ParameterError
 from softrobots.model.friction_coordinates import slipping
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.pressed_gaps import motor_slopes, pressed_gaps
+from softrobots.statics.contact.release import released
 from softrobots.statics.elastic_state import ElasticState, elastic_state
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import tip_motion
 from softrobots.statics.tip_search import LEVER, LocalSolution
-from softrobots.statics.tip_steps import Pull, pull
+from softrobots.statics.tip_steps import Pull, TipModel, pull
 
 
 class Goal(NamedTuple):
@@ -170,6 +171,14 @@ class LoadedTip:
         """Return the derivatives of tip and elastic coordinates by the actuators; see `sensitivity.tip_motion`."""
         motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
         return tip_motion(self.model, motors, springs, state.tangent, state.load.coupling, pressed_gaps(state))
+
+    def released(self, state: ElasticState, held: TipModel, damping: float) -> list[TipModel]:
+        """Return the models in which pressed contacts open, see `softrobots.statics.contact.release`."""
+        pressed = pressed_gaps(state)
+        if pressed is None:
+            return []
+        motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
+        return released(state, pressed, motors, springs, held, damping)
 
     def pull(self, state: ElasticState, follow: FloatArray) -> Pull | None:
         """Return the tensions with their derivatives; None of muscles of given length that push."""

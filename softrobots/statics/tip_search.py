@@ -14,7 +14,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.tip_steps import Pull, step_home, step_within
+from softrobots.statics.tip_steps import Pull, TipModel, step_home, step_within
 
 POSITION_TOLERANCE = 1e-9
 """Default tolerance of the position of the tip [m]."""
@@ -109,6 +109,9 @@ class SoughtTip(Protocol[State]):
             NeutralEquilibrium: If the tangent stiffness is singular.
         """
 
+    def released(self, state: State, held: TipModel, damping: float) -> list[TipModel]:
+        """Return the models in which contacts open that `held` keeps, if a step with this damping opens them."""
+
     def pull(self, state: State, follow: FloatArray) -> Pull | None:
         """Return the tensions, with the derivative of the elastic coordinates by the actuators.
 
@@ -151,15 +154,16 @@ def search(
     mu, redundant, unsolved, pace = damping * model.reach, basis.shape[1] > tip.rows, 0, 1.0
     home = q_motors if home is None else home
     last: tuple[FloatArray, FloatArray] | None = None  # last step and drift
+    refused = 0  # models of this state whose step did not lead nearer
     reached: LocalSolution[State] | None = None  # the last solution at the goal
     for iteration in range(1, max_iterations + 1):
-        missing = tip.missing(here.state)
+        arrived = here.arrived(tolerance)
         try:
-            slope, follow = tip.motion(here.state)
+            models = tip_models(tip, here.state, arrived)
         except NeutralEquilibrium:
             break
+        missing, slope, follow, shift = models[min(refused, len(models) - 1)]
         slope = slope @ basis
-        arrived = here.arrived(tolerance)
         if reached is not None and _apart(model, here.q_motors, home) > farthest:
             here = reached
             break
@@ -179,11 +183,14 @@ def search(
         pace = pace if last is None else _pace(*last, drift)
         miss, last = here.miss(model), None
         if not arrived and stationary:
-            break
+            refused += 1
+            if refused >= len(models):
+                break
+            continue
         step = towards + pace * drift
         step *= min(1.0, _LARGEST_STEP / max(float(np.linalg.norm(step)), 1e-300))
         moved = model.actuators.go(here.q_motors, basis @ step)
-        guess = here.state.q_springs + follow @ (moved - here.q_motors)
+        guess = here.state.q_springs + shift + follow @ (moved - here.q_motors)
         there = tip.solve(moved, guess)
         unsolved += there is None
         # Drifting home costs distance in second order, which the next step corrects.
@@ -191,8 +198,11 @@ def search(
         allowed = max(10.0 * tolerance, model.reach * min(4.0 * drifted**2, _NEAR)) if going_home else 0.0
         if there is not None and (there.miss(model) < miss or there.miss(model) <= allowed):
             here, mu, last = there, 0.1 * mu if mu > _LAST_DAMPING * model.reach else 0.0, (step, drift)
+            refused = 0
         elif drifted > float(np.linalg.norm(towards)):
             pace *= 0.5
+        elif refused + 1 < len(models):
+            refused += 1
         else:
             mu = max(10.0 * mu, 10.0 * _LAST_DAMPING * model.reach)
             if mu > 1e6 * model.reach:
@@ -224,30 +234,52 @@ def advance(
     """
     there = tip.towards(target)
     try:
-        slope, follow = there.motion(here.state)
+        models = tip_models(there, here.state)
     except NeutralEquilibrium:  # about to buckle: there is no linear prediction
         return None
     actuators = tip.model.actuators
-    pulled, slope = tip.pull(here.state, follow), slope @ actuators.basis
-    if pulled is None:
-        step = np.linalg.pinv(slope, rcond=1e-6) @ there.missing(here.state)
-    else:
-        damping = _LAST_DAMPING * tip.model.reach
-        missing = there.missing(here.state)
-        step, drift = step_within(tip.model, here.q_motors, slope, missing, damping, pulled, arrived=True)
-        step = step + drift * min(1.0, 0.5 * _LARGEST_STEP / max(float(np.linalg.norm(drift)), 1e-300))
-    if float(np.linalg.norm(step)) <= _LARGEST_STEP:
-        motors = actuators.go(here.q_motors, actuators.basis @ step)
-        springs = here.state.q_springs + follow @ (motors - here.q_motors)
-        near: dict[str, Any] = {"home": here.q_motors, "farthest": _JUMP}
-        found = search(there, motors, springs, tolerance=tolerance, damping=_WARM_DAMPING, **near)
-        if found is not None and found.arrived(tolerance) and _apart(tip.model, found.q_motors, here.q_motors) <= _JUMP:
-            return found
+    for missing, slope, follow, shift in models:
+        pulled, slope = tip.pull(here.state, follow), slope @ actuators.basis
+        if pulled is None:
+            step = np.linalg.pinv(slope, rcond=1e-6) @ missing
+        else:
+            damping = _LAST_DAMPING * tip.model.reach
+            step, drift = step_within(tip.model, here.q_motors, slope, missing, damping, pulled, arrived=True)
+            step = step + drift * min(1.0, 0.5 * _LARGEST_STEP / max(float(np.linalg.norm(drift)), 1e-300))
+        if float(np.linalg.norm(step)) <= _LARGEST_STEP:
+            motors = actuators.go(here.q_motors, actuators.basis @ step)
+            springs = here.state.q_springs + shift + follow @ (motors - here.q_motors)
+            near: dict[str, Any] = {"home": here.q_motors, "farthest": _JUMP}
+            found = search(there, motors, springs, tolerance=tolerance, damping=_WARM_DAMPING, **near)
+            if found is not None and found.arrived(tolerance) and _apart(tip.model, found.q_motors, here.q_motors) <= _JUMP:
+                return found
     if halvings == 0:
         return None
     middle = last.halfway(target)
     half = advance(tip, last, middle, here, tolerance, halvings - 1)
     return None if half is None else advance(tip, middle, target, half, tolerance, halvings - 1)
+
+
+def tip_models(tip: SoughtTip[State], state: State, arrived: bool = False) -> list[TipModel]:
+    """Return the models about a state, that in which a damped step leaves least to the goal first.
+
+    In free space there is one. A tip that leans on an obstacle cannot leave it by a small step: that takes as much of the
+    actuators as carries the contact force.
+
+    Raises:
+        NeutralEquilibrium: If the tangent stiffness is singular.
+    """
+    slope, follow = tip.motion(state)
+    held = TipModel(tip.missing(state), slope, follow, np.zeros(len(follow)))
+    damping, basis = _FIRST_DAMPING * tip.model.reach, tip.model.actuators.basis
+    others = [] if arrived else tip.released(state, held, damping)
+    if not others:
+        return [held]
+
+    def left(one: TipModel) -> float:
+        return float(np.linalg.norm(one.missing - one.slope @ one.step(basis, damping)))
+
+    return sorted([held, *others], key=left)
 
 
 def _apart(model: SoftModel, one: FloatArray, other: FloatArray) -> float:

@@ -26,6 +26,25 @@ _LEAST_DAMPING = 1e-7  # of a step, relative to the largest slope
 _ROUNDING = 1e-12  # of limits, in units of scaled actuators
 
 
+class TipModel(NamedTuple):
+    """How tip and elastic coordinates follow the actuators near a state, if its contacts are as assumed."""
+
+    missing: FloatArray
+    """Difference from the tip to the goal, shape (rows,) [m]."""
+    slope: FloatArray
+    """Derivative of the tip by the actuators, shape (rows, n_motors)."""
+    follow: FloatArray
+    """Derivative of the elastic coordinates by the actuators, shape (n_springs, n_motors)."""
+    shift: FloatArray
+    """Change of the elastic coordinates when contacts open, shape (n_springs,)."""
+
+    def step(self, basis: FloatArray, damping: float) -> FloatArray:
+        """Damped step of the actuators towards the goal, shape (n_motors,)."""
+        slope = self.slope @ basis
+        turned = slope @ slope.T + damping**2 * np.eye(len(slope))
+        return np.asarray(basis @ (slope.T @ np.linalg.solve(turned, self.missing)))
+
+
 class Pull(NamedTuple):
     """Tensions of a robot in equilibrium, relative to `Actuators.tension_scale`, and where they should be."""
 

@@ -21,6 +21,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.tip_force.force_search import Directions, search_force, torque_tolerance
 from softrobots.statics.tip_goal import Goal
 from softrobots.statics.tip_search import LocalSolution, advance, search
+from softrobots.statics.tip_steps import TipModel
 
 _ROUNDING = 1e-9  # by which a motor may be beyond its limits [rad, m or N]
 
@@ -248,6 +249,10 @@ class _SoughtTip:
 
     def missing(self, state: ChainState) -> FloatArray:
         return np.asarray(self.target - self.chain.tip(state.w))
+
+    def released(self, state: ChainState, held: TipModel, damping: float) -> list[TipModel]:
+        """Nothing: there are no obstacles."""
+        return []
 
     def pull(self, state: ChainState, follow: FloatArray) -> None:
         """Tensions are not sought here: the change of the actuators is the least."""

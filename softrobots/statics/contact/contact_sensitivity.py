@@ -49,7 +49,7 @@ def contact_sensitivity(model: SoftModel, equilibrium: Equilibrium) -> ContactSe
     pressed = pressed_gaps(state_in_contact(equilibrium, "a derivative"))
     gradients, by_motors = equilibrium.tangent_stiffness[:0], equilibrium.coupling[:0]
     if pressed is not None:
-        gradients, by_motors = pressed
+        gradients, by_motors, _ = pressed
     inverse = inverse_in_contact(model, equilibrium.tangent_stiffness, gradients)
     _, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
     return ContactSensitivity(

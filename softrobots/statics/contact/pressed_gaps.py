@@ -25,6 +25,8 @@ class PressedGaps(NamedTuple):
     """Their derivatives by the springs, shape (k, n_springs)."""
     by_motors: FloatArray
     """Their derivatives by the actuators, shape (k, n_motors)."""
+    forces: FloatArray
+    """Their normal forces, shape (k,) [N]."""
 
 
 def pressed_gaps(state: ElasticState) -> PressedGaps | None:
@@ -34,7 +36,9 @@ def pressed_gaps(state: ElasticState) -> PressedGaps | None:
         return None
     rounding = largest_residual(state.model, state.scale, TOLERANCE)
     pressed = active_contacts(touch, state.model.reach, rounding).pressed
-    return PressedGaps(touch.rows[pressed], touch.motor_rows[pressed]) if len(pressed) else None
+    if not len(pressed):
+        return None
+    return PressedGaps(touch.rows[pressed], touch.motor_rows[pressed], touch.forces[pressed])
 
 
 def state_in_contact(equilibrium: Equilibrium, what: str) -> ElasticState:
