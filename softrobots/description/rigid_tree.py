@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, read_only
-from softrobots.description.urdf_tags import SpringTag
+from softrobots.description.urdf_tags import CapsuleTag, SpringTag
 
 SOLIDS = {"box": ("size",), "cylinder": ("radius", "length"), "sphere": ("radius",)}
 """Shapes without a file, with the attributes of their sizes in URDF."""
@@ -73,15 +73,19 @@ class Shape:
     """A geometric shape of a body."""
 
     kind: str
-    """"box", "cylinder" (along z), "sphere" or "mesh"."""
+    """"box", "cylinder" (along z), "sphere" or "mesh"; of a collision shape in other formats also "capsule" (along z), "plane"
+    (with the normal z), or the name of a kind that is not read."""
     size: tuple[float, ...]
-    """Edges of a box, radius and length of a cylinder, radius of a sphere [m]; scale of a mesh along x, y, z."""
+    """Edges of a box, radius and length of a cylinder or of the straight part of a capsule, radius of a sphere [m]; scale of a
+    mesh along x, y, z; empty for others."""
     placement: Placement
     """Pose of its centre in the body."""
     rgba: tuple[float, ...] | None = None
     """Red, green, blue, opacity in [0, 1]; None if not given."""
     filename: str = ""
     """File of a mesh, as written in the description."""
+    name: str = ""
+    """Name; empty if it has none."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +104,17 @@ class Body:
     """Visual shapes."""
     collisions: tuple[Shape, ...] = ()
     """Collision shapes."""
+
+    @property
+    def capsules(self) -> tuple[CapsuleTag, ...]:
+        """Its round collision shapes as capsules; cylinders get round ends beyond their flat ones."""
+        tags = []
+        for shape in self.collisions:
+            if shape.kind in ("sphere", "cylinder", "capsule"):
+                along = (0.5 * shape.size[1] if shape.kind != "sphere" else 0.0) * shape.placement.rotation[:, 2]
+                (x, y, z), (u, v, w) = ((shape.placement.position + sign * along + 0.0).tolist() for sign in (-1.0, 1.0))
+                tags.append(CapsuleTag(self.name, (x, y, z), (u, v, w), shape.size[0]))
+        return tuple(dict.fromkeys(tags))
 
     @property
     def inertia_in_body(self) -> FloatArray:
@@ -160,6 +175,8 @@ class RigidTree:
     """Joint springs by joint name."""
     tip: str | None = None
     """Body that is the tip by default; None if the description names none."""
+    capsules: tuple[CapsuleTag, ...] = ()
+    """Capsules that hold the bodies."""
 
     @property
     def root(self) -> str:
@@ -173,6 +190,15 @@ class RigidTree:
     def joints_of(self, body: str) -> tuple[Joint, ...]:
         """Return the joints whose parent is that body."""
         return tuple(joint for joint in self.joints if joint.parent == body)
+
+
+def capsule_shape(tag: CapsuleTag) -> Shape:
+    """Return a capsule as a shape of its link; one whose core is a point as a sphere."""
+    start, end = np.array(tag.start), np.array(tag.end)
+    turn = np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), end - start).toRotationMatrix())
+    length = float(np.linalg.norm(end - start))
+    placement = Placement(read_only(0.5 * (start + end)), read_only(turn) if length else _NO_ROTATION)
+    return Shape("capsule" if length else "sphere", (tag.radius, length) if length else (tag.radius,), placement)
 
 
 def number_text(values: Iterable[float]) -> str:

@@ -73,6 +73,9 @@ def write_rigid_tree(tree: RigidTree) -> str:
     for joint in tree.joints:
         if joint.child == (tree.tip or "tip") and joint.kind == "fixed":
             _write_hints(robot, joint.name, preserveFixedJoint="true")
+    for tag in tree.capsules:
+        numbers = {"start": number_text(tag.start), "end": number_text(tag.end), "radius": repr(tag.radius)}
+        SubElement(robot, f"{{{NAMESPACE}}}capsule", {"link": tag.link} | numbers)
     if tree.tip is not None:
         SubElement(robot, f"{{{NAMESPACE}}}tip", {"link": tree.tip})
     ElementTree.indent(robot)

@@ -8,7 +8,6 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import DescriptionError
-from softrobots.description.rigid_tree import Shape
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import CapsuleTag
 from softrobots.model.soft_model import SoftModel, check_model
@@ -69,19 +68,13 @@ def capsule_tags(model: SoftModel) -> tuple[CapsuleTag, ...]:
 
 
 def _of_collisions(model: SoftModel) -> tuple[CapsuleTag, ...]:
-    shapes = [(body.name, shape) for body in read_rigid_tree(model.urdf).bodies for shape in body.collisions]
-    tags = [_capsule(link, shape) for link, shape in shapes if shape.kind in ("sphere", "cylinder")]
+    bodies = read_rigid_tree(model.urdf).bodies
+    tags = tuple(tag for body in bodies for tag in body.capsules)
     if not tags:
-        others = ", ".join(dict.fromkeys(f"a {shape.kind} of link {link}" for link, shape in shapes)) or "none"
+        shapes = [f"a {shape.kind} of link {body.name}" for body in bodies for shape in body.collisions]
         raise DescriptionError(
             f"{model.pinocchio.name} has no capsules to touch obstacles with; required: <softrobots:capsule link= start= end= "
-            f"radius=/> in <robot>, or spheres or cylinders as <collision>; its collision shapes: {others}"
+            f"radius=/> in <robot>, or spheres or cylinders as <collision>; its collision shapes: "
+            f"{', '.join(dict.fromkeys(shapes)) or 'none'}"
         )
-    return tuple(tags)
-
-
-def _capsule(link: str, shape: Shape) -> CapsuleTag:
-    half = 0.5 * shape.size[1] if shape.kind == "cylinder" else 0.0
-    position, along = shape.placement.position, half * shape.placement.rotation[:, 2]
-    (x, y, z), (u, v, w) = (position - along).tolist(), (position + along).tolist()
-    return CapsuleTag(link, (x, y, z), (u, v, w), shape.size[0])
+    return tags

@@ -14,7 +14,8 @@ from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
 from softrobots.core.files import as_path
 from softrobots.core.json_text import parse_json
 from softrobots.core.units import UNITS
-from softrobots.robots.parameter_file import LARGEST_FILE, parse_yaml
+from softrobots.core.yaml_text import parse_yaml
+from softrobots.robots.parameter_file import LARGEST_FILE
 
 ROTATIONS = {"matrix": 9, "quaternion": 4, "roll_pitch_yaw": 3, "rotation_vector": 3}
 """Forms of the rotation of a pose, with their number of columns: rows of a matrix; w, x, y, z; fixed axes; axis times angle."""

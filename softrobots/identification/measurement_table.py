@@ -13,8 +13,9 @@ from softrobots.core.bounded_reading import opened
 from softrobots.core.checks import FloatArray
 from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError, SoftRobotsError
+from softrobots.core.yaml_text import parse_yaml
 from softrobots.identification.measurement_columns import QUANTITIES, read_columns
-from softrobots.robots.parameter_file import LARGEST_FILE, parse_yaml
+from softrobots.robots.parameter_file import LARGEST_FILE
 
 _OWN_COLUMNS = "# columns: "
 

@@ -11,11 +11,12 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
+from softrobots.core.yaml_text import parse_yaml
 from softrobots.description.argument_notes import argument_notes
 from softrobots.description.expansion import declared_arguments
 from softrobots.robots import ROBOTS, XacroRobot, robot_class
 from softrobots.robots.fields import facts_of
-from softrobots.robots.parameter_file import parse_yaml, write_parameters
+from softrobots.robots.parameter_file import write_parameters
 
 _WORDS = {"true": True, "false": False, "none": None, "": None}  # as xacro arguments spell them
 

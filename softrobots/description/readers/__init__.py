@@ -1,19 +1,22 @@
 """Translation of MJCF and SDF, recognised by their root tag, to URDF text with the tags of this package.
 
-MJCF is compiled by MuJoCo and SDF parsed by Drake, so that defaults, classes, units and frames are those of the format.
+MJCF is compiled by MuJoCo and SDF parsed by Drake, so that defaults, classes, units and frames are those of the format. Round
+collision shapes become capsules (`<softrobots:capsule>`).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 
 from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import parse_xml
 from softrobots.description.readers.mjcf import read_mjcf
 from softrobots.description.readers.sdf import read_sdf
-from softrobots.description.rigid_tree import RigidTree
-from softrobots.description.rigid_tree_urdf import write_rigid_tree
+from softrobots.description.rigid_tree import RigidTree, capsule_shape
+from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
+from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_structure import check_link_count
 
 KINDS: Mapping[str, str] = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF"}
@@ -43,4 +46,22 @@ def to_urdf(text: str, source: str, path: Path | None = None) -> str:
     if tag == "robot":
         check_link_count(root, source)
         return text
-    return write_rigid_tree(_READERS[tag](text, source, path))
+    tree = _READERS[tag](text, source, path)
+    bodies = tuple(replace(body, collisions=()) for body in tree.bodies)
+    return write_rigid_tree(replace(tree, bodies=bodies, capsules=tuple(tag for body in tree.bodies for tag in body.capsules)))
+
+
+def read_world(text: str, source: str, path: Path | None = None) -> RigidTree:
+    """Read a description with its collision shapes; arguments and errors are those of `to_urdf`.
+
+    Capsules in the tags of this package are among the collision shapes.
+    """
+    if (tag := str(parse_xml(text, source).tag)) in _READERS:
+        return _READERS[tag](text, source, path)
+    capsules = read_tags(to_urdf(text, source), source).capsules  # refuses other formats, and what is no URDF
+    tree = read_rigid_tree(text, source)
+    bodies = (
+        replace(body, collisions=(*body.collisions, *(capsule_shape(tag) for tag in capsules if tag.link == body.name)))
+        for body in tree.bodies
+    )
+    return replace(tree, bodies=tuple(bodies))

@@ -17,7 +17,7 @@ from softrobots.core.errors import DescriptionError, MissingDependency
 from softrobots.core.xml_input import parse_xml
 from softrobots.description.readers.mjcf_limits import check_mjcf
 from softrobots.description.readers.mjcf_refusals import driven_joint, name_in, not_carried
-from softrobots.description.readers.mjcf_shapes import visible_shapes
+from softrobots.description.readers.mjcf_shapes import collision_shapes, visible_shapes
 from softrobots.description.readers.tree_builder import TreeBuilder
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree
 from softrobots.description.urdf_tags import SpringTag
@@ -31,7 +31,7 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     statics (`softrobots.description.readers.shared_mass`), else without mass. A hinge away from the origin of its body gets a
     link without mass at its anchor. A named site becomes a link without mass, unless a body has that name. The tip is the body
     or site called `tip`, or the only moving body at an end of the tree. Visible boxes, cylinders, spheres and mesh files are
-    read, and capsules as cylinders.
+    read, and capsules as cylinders; of collision shapes all kinds, those that nothing here reads by their kind alone.
 
     Features without effect on a loaded robot at rest are ignored: contacts, damping polynomials, sensors, armature of joints
     with stiffness, actuators with zero control, and position actuators of joints without stiffness, which are motors.
@@ -54,7 +54,7 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
     reasons = not_carried(mujoco, model)
     if reasons:
         raise DescriptionError(f"{source} has features that a robot of springs and motors lacks: {'; '.join(reasons)}")
-    shapes = visible_shapes(mujoco, model, text, path)
+    shapes, collisions = (of(mujoco, model, text, path) for of in (visible_shapes, collision_shapes))
     bodies = [name_in(model, "body", number) for number in range(model.nbody)]
     joints = [name_in(model, "joint", number) for number in range(model.njnt)]
     name = bytes(model.names).split(b"\0", 1)[0].decode("utf-8", "replace")
@@ -66,6 +66,7 @@ def read_mjcf(text: str, source: str, path: Path | None = None) -> RigidTree:
             Placement.turned(model.body_ipos[number], model.body_iquat[number]),
             read_only(np.diag(model.body_inertia[number])),
             shapes[number],
+            collisions[number],
         )
         if number == 0:
             builder.draw_on_world(body)

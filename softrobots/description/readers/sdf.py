@@ -7,7 +7,7 @@ read.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -17,7 +17,7 @@ from softrobots.core.checks import read_only
 from softrobots.core.errors import DescriptionError, MissingDependency
 from softrobots.core.xml_input import parse_xml
 from softrobots.description.readers.sdf_refusals import not_carried
-from softrobots.description.readers.sdf_shapes import placement_of, visible_shapes
+from softrobots.description.readers.sdf_shapes import collision_shapes, placement_of, visible_shapes
 from softrobots.description.readers.sdf_text import warnings_of_drake, without_drawings
 from softrobots.description.readers.tree_builder import TreeBuilder
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree
@@ -44,7 +44,8 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
     nested models, and of static ones beside the robot, get the name of the model in front, `arm__link`. A joint away from the
     origin of its child link gets a link without mass. Frames of the file become links without mass. The tip is the link or
     frame called `tip`, or the only moving link at an end of the tree. Visible boxes, cylinders, spheres and existing mesh files
-    are read, and capsules as cylinders. Contacts, plugins and controllers are ignored.
+    are read, and capsules as cylinders; of collision shapes all kinds, those that nothing here reads by their kind alone.
+    Contacts, plugins and controllers are ignored.
 
     The arguments are those of `softrobots.description.readers.to_urdf`.
 
@@ -74,10 +75,11 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
         reasons = [*_not_supported(plant), *(line for line in warnings if "invalid inertia" in line)]
     if reasons:
         raise DescriptionError(f"{source} has features that a robot of springs and motors lacks: {'; '.join(reasons)}")
-    return _tree(plant, source, {str(frame.get("name")) for frame in root.iter("frame")}, visible_shapes(text, path))
+    frames = {str(frame.get("name")) for frame in root.iter("frame")}
+    return _tree(plant, source, frames, visible_shapes(text, path), collision_shapes(text, path))
 
 
-def _tree(plant: Any, source: str, frames: set[str], shapes: dict[str, list[Any]]) -> RigidTree:
+def _tree(plant: Any, source: str, frames: set[str], *shapes: dict[str, list[Any]]) -> RigidTree:
     edges = _edges(plant, source)
     model = _moving_model(plant, edges, source)
     names = {edge.child.index(): _name(plant, edge.child, model) for edge in edges}
@@ -191,14 +193,14 @@ def _springs(plant: Any) -> dict[Any, SpringTag]:
     return springs
 
 
-def _body(body: Any, name: str, shapes: dict[str, list[Any]]) -> Body:
+def _body(body: Any, name: str, shapes: Sequence[dict[str, list[Any]]]) -> Body:
     inertia = body.default_spatial_inertia()
     mass = float(inertia.get_mass())
-    drawn = tuple(shapes.get(body.scoped_name().get_full(), ()))
+    drawn = [tuple(of_kind.get(body.scoped_name().get_full(), ())) for of_kind in shapes]
     if mass == 0.0:
-        return Body(name, 0.0, Placement(), read_only(np.zeros((3, 3))), drawn)
+        return Body(name, 0.0, Placement(), read_only(np.zeros((3, 3))), *drawn)
     about_centre = inertia.Shift(inertia.get_com()).CalcRotationalInertia().CopyToFullMatrix3()
-    return Body(name, mass, Placement(read_only(np.array(inertia.get_com()))), read_only(np.array(about_centre)), drawn)
+    return Body(name, mass, Placement(read_only(np.array(inertia.get_com()))), read_only(np.array(about_centre)), *drawn)
 
 
 def _name(plant: Any, element: Any, model: str) -> str:

@@ -1,7 +1,8 @@
-"""Visible shapes of an SDF file, as far as URDF has them."""
+"""Shapes of an SDF file: the visible ones as far as URDF has them, and all that collide."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -9,16 +10,39 @@ import numpy as np
 
 from softrobots.core.checks import read_only
 from softrobots.description.mesh_files import DRAWN_FILES
-from softrobots.description.readers.sdf_text import warnings_of_drake, with_found_meshes
+from softrobots.description.readers.sdf_text import collisions_as_visuals, warnings_of_drake, with_found_meshes
 from softrobots.description.rigid_tree import Placement, Shape
 
 
 def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
-    """Return the visual shapes of every link, by its scoped name `model::link`.
+    """Return the visual shapes of every link, by its scoped name `model::link`; capsules as cylinders.
 
     Meshes whose files are missing are omitted; the result is empty if Drake cannot read one of the others. Mesh files are
     relative to the file of the document, if it has one.
     """
+    drawn = _read(with_found_meshes(text, None if path is None else path.parent)) or {}
+    kinds = {"capsule": "cylinder"}
+    return {
+        link: [replace(shape, kind=kinds.get(shape.kind, shape.kind)) for shape in shapes if shape.kind != "plane"]
+        for link, shapes in drawn.items()
+    }
+
+
+def collision_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
+    """Return the collision shapes of every link, likewise; those that are not read are there by their kind alone."""
+    if "<collision" not in text:
+        return {}
+    readable, others = collisions_as_visuals(text, None if path is None else path.parent)
+    shapes = _read(readable)
+    if shapes is None:
+        shapes, others = {}, collisions_as_visuals(text, None, read=())[1]
+    for link, name, kind in others:
+        shapes.setdefault(link, []).append(Shape(kind, (), Placement(), name=name))
+    return shapes
+
+
+def _read(text: str) -> dict[str, list[Shape]] | None:
+    """The visuals of a document that has only those that Drake reads; None if it refuses one."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
     from pydrake.multibody.tree import BodyIndex
@@ -29,9 +53,9 @@ def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
     parser = Parser(plant)
     try:
         with warnings_of_drake(shown=False):
-            parser.AddModelsFromString(with_found_meshes(text, None if path is None else path.parent), "sdf")
+            parser.AddModelsFromString(text, "sdf")
     except (Exception, SystemExit):  # SystemExit: assertions of Drake
-        return {}
+        return None
     inspector, shapes = scene.model_inspector(), {}
     for number in range(plant.num_bodies()):
         body = plant.get_body(BodyIndex(number))
@@ -48,15 +72,18 @@ def placement_of(pose: Any) -> Placement:
 def _shape(inspector: Any, geometry: Any) -> Shape | None:
     shape, pose = inspector.GetShape(geometry), inspector.GetPoseInFrame(geometry)
     place = placement_of(pose)
-    kind, rgba = type(shape).__name__, _colour(inspector.GetIllustrationProperties(geometry))
-    if kind == "Box":
-        return Shape("box", (shape.width(), shape.depth(), shape.height()), place, rgba)
-    if kind == "Sphere":
-        return Shape("sphere", (shape.radius(),), place, rgba)
-    if kind in ("Cylinder", "Capsule"):
-        return Shape("cylinder", (shape.radius(), shape.length()), place, rgba)
-    if kind == "Mesh" and shape.source().is_path() and shape.extension() in DRAWN_FILES:
-        return Shape("mesh", tuple(np.array(shape.scale3()).tolist()), place, rgba, str(shape.source().path()))
+    kind, rgba = type(shape).__name__.lower(), _colour(inspector.GetIllustrationProperties(geometry))
+    name = str(inspector.GetName(geometry)).rpartition("::")[2]
+    if kind == "box":
+        return Shape("box", (shape.width(), shape.depth(), shape.height()), place, rgba, name=name)
+    if kind == "sphere":
+        return Shape("sphere", (shape.radius(),), place, rgba, name=name)
+    if kind in ("cylinder", "capsule"):
+        return Shape(kind, (shape.radius(), shape.length()), place, rgba, name=name)
+    if kind == "halfspace":
+        return Shape("plane", (), place, rgba, name=name)
+    if kind == "mesh" and shape.source().is_path() and shape.extension() in DRAWN_FILES:
+        return Shape("mesh", tuple(np.array(shape.scale3()).tolist()), place, rgba, str(shape.source().path()), name)
     return None
 
 

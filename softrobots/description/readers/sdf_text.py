@@ -7,7 +7,7 @@ plane without a direction.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -45,6 +45,39 @@ def with_found_meshes(text: str, folder: Path | None) -> str:
             elif node.tagName not in ("pose", "geometry", "transparency"):
                 visual.removeChild(node)
     return str(document.toxml())
+
+
+def collisions_as_visuals(
+    text: str, folder: Path | None, read: Sequence[str] = (*_DRAWN, "plane")
+) -> tuple[str, list[tuple[str, str, str]]]:
+    """Return an SDF document whose collision shapes of the kinds `read` are its visuals, and the others.
+
+    Visuals may be of more kinds and files than Drake collides.
+
+    Returns:
+        The document; and link, by its scoped name `model::link`, name and kind of each other collision shape.
+    """
+    document, others = minidom.parseString(text.encode("utf-8")), []
+    _remove(document, lambda e: e.tagName in _LEFT_OUT and e.tagName != "collision")
+    for collision in document.getElementsByTagName("collision"):
+        shapes = [node for node in _elements(collision) if node.tagName == "geometry" for node in _elements(node)]
+        kind = shapes[0].tagName if len(shapes) == 1 else "shape"
+        link: Any = collision.parentNode
+        if kind not in read or not _found(shapes[0], folder):
+            scope, model = [link.getAttribute("name")], link.parentNode
+            while isinstance(model, minidom.Element) and model.tagName == "model":
+                scope, model = [model.getAttribute("name"), *scope], model.parentNode
+            if kind != "empty":
+                others.append(("::".join(scope), collision.getAttribute("name"), kind))
+            continue
+        visual = document.createElement("visual")
+        for name, value in collision.attributes.items():
+            visual.setAttribute(name, value)
+        for node in [node for node in _elements(collision) if node.tagName in ("pose", "geometry")]:
+            visual.appendChild(node)
+        link.appendChild(visual)
+    _remove(document, lambda e: e.tagName == "collision")
+    return str(document.toxml()), others
 
 
 @contextmanager

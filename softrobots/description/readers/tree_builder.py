@@ -61,8 +61,8 @@ class TreeBuilder:
         self._carriers: set[str] = set()
 
     def draw_on_world(self, world: Body) -> None:
-        """Copy the visual shapes of a body to the world."""
-        self._bodies[0] = replace(self._bodies[0], visuals=world.visuals)
+        """Copy the shapes of a body to the world."""
+        self._bodies[0] = replace(self._bodies[0], visuals=world.visuals, collisions=world.collisions)
 
     def add(self, body: Body, parent: str, joints: Sequence[Joint], end: Placement) -> None:
         """Add a body.
@@ -125,9 +125,9 @@ class TreeBuilder:
         """Return the tree; its tip is the link called `tip`, or the only moving body without children.
 
         Raises:
-            DescriptionError: If there are no bodies.
+            DescriptionError: If there are no bodies, and nothing stands on the world.
         """
-        if len(self._bodies) == 1:
+        if len(self._bodies) == 1 and not self._bodies[0].collisions:
             raise DescriptionError(f"{self._source} has no bodies")
         ends = self._moving - self._carriers
         tip = "tip" if "tip" in self._links else next(iter(ends)) if len(ends) == 1 else None

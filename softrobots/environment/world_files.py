@@ -1,0 +1,102 @@
+"""Environments from files: worlds in URDF, SDF or MJCF, and plain data in YAML or JSON."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.bounded_reading import read_text
+from softrobots.core.errors import DescriptionError, FileFormatError, NameNotFound, ParameterError
+from softrobots.core.files import as_path
+from softrobots.core.json_text import parse_json
+from softrobots.core.xml_input import read_xml
+from softrobots.core.yaml_text import parse_yaml
+from softrobots.description.mesh_files import with_absolute_paths
+from softrobots.description.readers import read_world
+from softrobots.description.rigid_tree import Placement, RigidTree, Shape
+from softrobots.environment.convex_mesh import Mesh
+from softrobots.environment.environment import Environment
+from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
+
+LARGEST_FILE = 10_000_000
+"""Largest size of a file of plain data [bytes]."""
+
+_DEEPEST, _MOST_VALUES = 6, 50_000  # of YAML: rows of corners in an obstacle in the list
+_READ = ("box", "cylinder", "sphere", "capsule", "mesh", "plane")
+
+
+def read_environment(path: str | os.PathLike[str], *, hull: bool = False) -> Environment:
+    """Read the obstacles of a file; see `Environment.from_file`."""
+    file = as_path("path", path)
+    if file.suffix.lower() in (".yaml", ".yml", ".json"):
+        text = read_text(file, LARGEST_FILE)
+        try:
+            json = file.suffix.lower() == ".json"
+            data = parse_json(text) if json else parse_yaml(text, deepest=_DEEPEST, most=_MOST_VALUES)
+            return Environment.from_dict(_beside(data, file.parent))
+        except (FileFormatError, ParameterError, NameNotFound) as error:
+            raise FileFormatError(f"cannot read obstacles from {file}: {error}") from error
+    tree = read_world(with_absolute_paths(read_xml(file), file.parent), str(file), file)
+    obstacles = _obstacles(tree, str(file), hull)
+    if not obstacles:
+        raise DescriptionError(f"{file} has no collision shapes; one or more are required: {', '.join(_READ)}")
+    return Environment(obstacles)
+
+
+def _beside(data: Any, folder: Path) -> Any:
+    """Plain data in which the relative files of meshes are those of a folder."""
+    obstacles = data.get("obstacles") if isinstance(data, dict) else None
+    for one in obstacles if isinstance(obstacles, list) else ():
+        name = one.get("vertices") if isinstance(one, dict) else None
+        if isinstance(name, str) and "://" not in name:
+            one["vertices"] = str(folder / name)
+    return data
+
+
+def _obstacles(tree: RigidTree, source: str, hull: bool) -> list[Obstacle]:
+    moving = [joint.name for joint in tree.joints if joint.movable]
+    if moving:
+        raise DescriptionError(
+            f"{source} has joints that move: {', '.join(moving)}; obstacles are fixed to the world: fixed joints only"
+        )
+    places = {tree.root: Placement()}
+    for joint in tree.joints:  # parents first
+        places[joint.child] = places[joint.parent] @ joint.placement
+    shapes = [(body.name, number, shape) for body in tree.bodies for number, shape in enumerate(body.collisions, start=1)]
+    others = [
+        f"a {shape.kind} {shape.name!r} of {body}"
+        for body, _, shape in shapes
+        if shape.kind not in _READ or (shape.kind == "mesh" and not shape.filename)
+    ]
+    if others:
+        raise DescriptionError(
+            f"{source} has collision shapes that are not read: {', '.join(others)}; required: {', '.join(_READ)} (from a file)"
+        )
+    obstacles = []
+    for body, number, shape in shapes:
+        alone = sum(name == body for name, _, _ in shapes) == 1
+        name = body if alone else f"{body}_{shape.name or number}"
+        if body == "world":
+            name = shape.name
+        try:
+            obstacles.append(_obstacle(shape, places[body] @ shape.placement, name or None, hull))
+        except (ParameterError, FileFormatError) as error:
+            raise DescriptionError(f"{source}: the collision shape {shape.name or number} of {body}: {error}") from error
+    return obstacles
+
+
+def _obstacle(shape: Shape, place: Placement, name: str | None, hull: bool) -> Obstacle:
+    where: dict[str, Any] = {"name": name, "position": place.position, "rotation": place.rotation}
+    if shape.kind == "plane":
+        normal = place.rotation[:, 2]
+        return HalfSpace(normal, float(normal @ place.position), name=name)
+    if shape.kind == "sphere":
+        return Sphere(*shape.size, place.position, name=name)
+    if shape.kind == "box":
+        return Box(shape.size, **where)
+    if shape.kind == "mesh":
+        return Mesh(shape.filename, scale=np.array(shape.size), hull=hull, **where)
+    return (Cylinder if shape.kind == "cylinder" else Capsule)(*shape.size, **where)
