@@ -761,6 +761,7 @@ DOORWAYS = {
     "core.result_file": ("results NPZ", "results JSON"),
     "core.checkpoint": ("checkpoint JSON", "checkpoint NPZ"),
     "studies.benchmark.results": ("benchmark JSON",),
+    "environment.world_files": ("environment YAML", "environment JSON", "world URDF", "world MJCF", "world SDF"),
     "robots.parameter_file": ("parameters YAML", "parameters JSON"),
     "view.live.input": ("watched file",),
     "export.meshes": ("STL",),

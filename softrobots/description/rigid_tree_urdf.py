@@ -102,7 +102,10 @@ _Colours = Mapping[str, Element | None]  # by name of the material
 
 def _body(link: Element, colours: _Colours) -> Body:
     name, inertial = link.get("name", ""), link.find("inertial")
-    shapes = [tuple(_shape(element, colours) for element in link.findall(kind)) for kind in ("visual", "collision")]
+    try:
+        shapes = [tuple(_shape(element, colours) for element in link.findall(kind)) for kind in ("visual", "collision")]
+    except ValueError as error:
+        raise ValueError(f"link {name} has {error}") from error
     if inertial is None:
         return Body(name, 0.0, Placement(), np.zeros((3, 3)), *shapes)
     xx, xy, xz, yy, yz, zz = (_numbers(inertial.find("inertia"), entry, "0")[0] for entry in _ENTRIES)
@@ -124,7 +127,7 @@ def _shape(element: Element, colours: _Colours) -> Shape:
     if material is not None and colour is None:
         colour = colours.get(material.get("name", ""))
     rgba = None if colour is None else tuple(_numbers(colour, "rgba", "1 1 1 1").tolist())
-    return Shape(solid.tag, tuple(size.tolist()), _placement(element), rgba, solid.get("filename", ""))
+    return Shape(solid.tag, tuple(size.tolist()), _placement(element), rgba, solid.get("filename", ""), element.get("name", ""))
 
 
 def _joint(element: Element) -> Joint:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
@@ -11,6 +12,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_number, instance_of
 from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.core.yaml_text import yaml_of
 from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 
@@ -174,6 +176,39 @@ class Environment:
             except TypeError as error:  # a field is missing
                 raise ParameterError("data['obstacles']", one, f"complete ({error})") from error
         return cls(obstacles, self_contact=data.get("self_contact", False))
+
+    def to_yaml(self) -> str:
+        """Return it as YAML, an obstacle a line, for a file that `from_file` reads.
+
+        Raises:
+            ParameterError: If an obstacle moves: `at` fixes it.
+        """
+        data = self.to_dict()
+        lines = (f"  - {yaml_of(one)}\n" for one in data["obstacles"])
+        return f"self_contact: {yaml_of(data['self_contact'])}\nobstacles:{' []' if not len(self) else ''}\n{''.join(lines)}"
+
+    @classmethod
+    def from_file(cls, path: str | os.PathLike[str], *, hull: bool = False) -> Environment:
+        """Return the obstacles of a file: a world in URDF, SDF or MJCF, or plain data.
+
+        Collision shapes of the world become obstacles, called after their links, and planes half-spaces. Boxes, spheres,
+        cylinders, capsules (in URDF, those in the tags of this package) and mesh files are read; another shape is refused, and
+        a joint that moves. MJCF is compiled by MuJoCo, SDF parsed by Drake (extra `interop`).
+
+        Args:
+            path: The file. One that ends with `.yaml`, `.yml` or `.json` is plain data, as `to_yaml` or `to_dict` returns it;
+                mesh files in it, as `vertices`, are relative to it.
+            hull: Whether a mesh of a world that is not convex is replaced by its convex hull; else it is refused.
+
+        Raises:
+            ParameterError: If `path` is no path.
+            FileFormatError: If plain data cannot be read, has another form, or a value is invalid.
+            DescriptionError: If a world cannot be read, has no collision shapes or one that is not read, or a joint moves.
+            MissingDependency: If MuJoCo or Drake is needed and not installed.
+        """
+        from softrobots.environment.world_files import read_environment  # which makes environments
+
+        return read_environment(path, hull=hull)
 
 
 def check_environment(environment: Any) -> Environment:

@@ -67,7 +67,7 @@ def _obstacles(tree: RigidTree, source: str, hull: bool) -> list[Obstacle]:
         places[joint.child] = places[joint.parent] @ joint.placement
     shapes = [(body.name, number, shape) for body in tree.bodies for number, shape in enumerate(body.collisions, start=1)]
     others = [
-        f"a {shape.kind} {shape.name!r} of {body}"
+        f"{shape.kind} {shape.name!r} of {body}"
         for body, _, shape in shapes
         if shape.kind not in _READ or (shape.kind == "mesh" and not shape.filename)
     ]
@@ -89,12 +89,13 @@ def _obstacles(tree: RigidTree, source: str, hull: bool) -> list[Obstacle]:
 
 
 def _obstacle(shape: Shape, place: Placement, name: str | None, hull: bool) -> Obstacle:
-    where: dict[str, Any] = {"name": name, "position": place.position, "rotation": place.rotation}
+    where: dict[str, Any] = {"name": name, "position": place.position}
     if shape.kind == "plane":
         normal = place.rotation[:, 2]
         return HalfSpace(normal, float(normal @ place.position), name=name)
     if shape.kind == "sphere":
-        return Sphere(*shape.size, place.position, name=name)
+        return Sphere(*shape.size, **where)
+    where["rotation"] = place.rotation
     if shape.kind == "box":
         return Box(shape.size, **where)
     if shape.kind == "mesh":

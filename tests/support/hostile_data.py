@@ -197,6 +197,30 @@ def read_parameter_file(file: Path) -> None:
         raise MemoryError("a robot of many thousand joints")
 
 
+@cache
+def environment_corpus() -> list[bytes]:
+    """Every kind of obstacle, as it is written, and by hand."""
+    turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+    round_ones = [Cylinder(0.1, 0.5, rotation=turn), Capsule(0.1, 0.5, (1, 2, 3)), Sphere(0.2, (0, 1, 0), name="ball")]
+    corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
+    all_kinds = Environment([HalfSpace((0, 0, 1), -0.5), Box((1, 2, 3), rotation=turn), *round_ones, Mesh(corners)])
+    by_hand = b"# a shelf\nobstacles:\n- kind: box\n  size: [1, 0.5, 2e-2]\n  name: shelf\n- {kind: half_space, normal: [0, 0, 1]}\n"
+    return [all_kinds.to_yaml().encode(), by_hand, b"obstacles: []\nself_contact: true\n"]
+
+
+@cache
+def environment_json_corpus() -> list[bytes]:
+    """The same as JSON."""
+    return [json.dumps(yaml.safe_load(text)).encode() for text in environment_corpus()]
+
+
+def read_environment_file(file: Path) -> None:
+    """Obstacles, and their distances from a point."""
+    environment = Environment.from_file(file)
+    for field, _ in obstacle_fields(environment):
+        finite(*field.distance(np.array([[3.0, 2.0, 1.0]])))
+
+
 def command_corpus() -> list[bytes]:
     """Lines, and an object."""
     lines = b"# a comment\ntarget 0.9 0.3 0.2\nforce 0 10 -15\ngravity on\nmotors 0.3 0.6 -0.8\ngravity 0 0 -9.81\nreset\n"
@@ -415,6 +439,8 @@ READERS: dict[str, tuple[Callable[[], list[bytes]], Damage, Callable[[Path], obj
     "benchmark JSON": (bench_corpus, damaged_bytes, read_bench, ".json"),
     "parameters YAML": (parameter_corpus, damaged_bytes, read_parameter_file, ".yaml"),
     "parameters JSON": (parameter_json_corpus, damaged_bytes, read_parameter_file, ".json"),
+    "environment YAML": (environment_corpus, damaged_bytes, read_environment_file, ".yaml"),
+    "environment JSON": (environment_json_corpus, damaged_bytes, read_environment_file, ".json"),
     "checkpoint JSON": (lambda: [_kept(CASE)], damaged_bytes, read_case, ".json"),
     "checkpoint NPZ": (lambda: [_kept("block_000000.npz")], damaged_archive, read_block, ".npz"),
     "watched file": (command_corpus, damaged_bytes, read_wanted, ".txt"),

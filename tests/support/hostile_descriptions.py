@@ -135,6 +135,46 @@ def read_text(file: Path) -> None:
     check_model(sr.load_model(description, springs=springs, tip=_tip_of(text)))
 
 
+def world_corpus() -> list[bytes]:
+    """A table with a post, and a robot that stands still."""
+    return [
+        b'<robot name="w" xmlns:s="urn:softrobots:urdf"><link name="a"><collision><geometry><box size="1 1 .1"/></geometry>'
+        b'</collision><collision name="c"><origin xyz="0 0 .4" rpy="0 .1 0"/><geometry><cylinder radius=".1" length=".5"/>'
+        b'</geometry></collision></link><link name="b"><collision><geometry><sphere radius=".2"/></geometry></collision></link>'
+        b'<joint name="j" type="fixed"><origin xyz="1 0 0" rpy="0 0 .5"/><parent link="a"/><child link="b"/></joint>'
+        b'<s:capsule link="b" start="0 0 0" end="0 0 1" radius=".1"/></robot>'
+    ]
+
+
+def mjcf_world_corpus() -> list[bytes]:
+    """Every kind of shape that is read, and one that is not seen."""
+    return [
+        b'<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1" euler="10 0 0"/><geom type="sphere" size=".3" pos="2 0 0"/>'
+        b'<body name="post" pos="1 0 0" euler="0 30 0"><geom type="capsule" fromto="0 0 0 0 0 1" size=".1"/>'
+        b'<geom type="box" size=".1 .2 .3" contype="0"/><body pos="0 .5 0"><geom type="cylinder" size=".1 .4"/></body></body>'
+        b"</worldbody></mujoco>"
+    ]
+
+
+def sdf_world_corpus() -> list[bytes]:
+    """A ground and a shelf."""
+    return [
+        b'<sdf version="1.9"><world name="w"><model name="g"><static>true</static><link name="l"><collision name="c"><geometry>'
+        b"<plane><normal>0 0 1</normal></plane></geometry></collision></link></model>"
+        b'<model name="s"><static>true</static><pose>1 0 0 0 .1 0</pose><link name="l"><collision name="c"><pose>0 0 1 0 0 0</pose>'
+        b'<geometry><box><size>1 1 .1</size></box></geometry></collision><collision name="d"><geometry><capsule><radius>.1</radius>'
+        b"<length>.5</length></capsule></geometry></collision></link></model></world></sdf>"
+    ]
+
+
+def read_world(file: Path) -> None:
+    """Its obstacles, all finite."""
+    for obstacle in sr.Environment.from_file(file):
+        transform = obstacle.transform_to_world
+        if not np.all(np.isfinite(transform)) or abs(np.linalg.det(transform) - 1.0) > 1e-6:
+            raise RuntimeError(f"an obstacle {obstacle}")
+
+
 def read_xacro(file: Path) -> None:
     """Expand and load."""
     sr.load_model(expand(file), springs={})

@@ -36,6 +36,9 @@ READERS: dict[str, Reader] = {
     "URDF text": Reader(descriptions.urdf_corpus, damages.damaged_xml, descriptions.read_text, ".txt"),
     "MJCF": Reader(descriptions.mjcf_corpus, damages.damaged_xml, descriptions.read_description, ".xml"),
     "SDF": Reader(descriptions.sdf_corpus, damages.damaged_xml, descriptions.read_description, ".sdf"),
+    "world URDF": Reader(descriptions.world_corpus, damages.damaged_xml, descriptions.read_world, ".urdf"),
+    "world MJCF": Reader(descriptions.mjcf_world_corpus, damages.damaged_xml, descriptions.read_world, ".xml"),
+    "world SDF": Reader(descriptions.sdf_world_corpus, damages.damaged_xml, descriptions.read_world, ".sdf"),
     # A xacro file is a program, which ends after so many steps; the robot that others are mounted on goes through one, too.
     "xacro": Reader(descriptions.xacro_corpus, damages.damaged_xml, descriptions.read_xacro, ".xacro", 5.0, 300.0),
     "mount": Reader(descriptions.mounted_corpus, damages.damaged_xml, descriptions.read_mounted, ".urdf", 5.0, 300.0),

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import read_only
+from softrobots.core.errors import DescriptionError
 from softrobots.description.mesh_files import DRAWN_FILES
 from softrobots.description.readers.sdf_text import collisions_as_visuals, warnings_of_drake, with_found_meshes
 from softrobots.description.rigid_tree import Placement, Shape
@@ -20,7 +21,10 @@ def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
     Meshes whose files are missing are omitted; the result is empty if Drake cannot read one of the others. Mesh files are
     relative to the file of the document, if it has one.
     """
-    drawn = _read(with_found_meshes(text, None if path is None else path.parent)) or {}
+    try:
+        drawn = _read(with_found_meshes(text, None if path is None else path.parent))
+    except DescriptionError:
+        return {}
     kinds = {"capsule": "cylinder"}
     return {
         link: [replace(shape, kind=kinds.get(shape.kind, shape.kind)) for shape in shapes if shape.kind != "plane"]
@@ -29,20 +33,25 @@ def visible_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
 
 
 def collision_shapes(text: str, path: Path | None) -> dict[str, list[Shape]]:
-    """Return the collision shapes of every link, likewise; those that are not read are there by their kind alone."""
+    """Return the collision shapes of every link, likewise; those that are not read are there by their kind alone.
+
+    If Drake refuses one of them, the first is there with the reason as its kind, and no other.
+    """
     if "<collision" not in text:
         return {}
     readable, others = collisions_as_visuals(text, None if path is None else path.parent)
-    shapes = _read(readable)
-    if shapes is None:
-        shapes, others = {}, collisions_as_visuals(text, None, read=())[1]
+    try:
+        shapes = _read(readable)
+    except DescriptionError as error:
+        link, name, kind = collisions_as_visuals(text, None, read=())[1][0]
+        shapes, others = {}, [(link, name, f"{kind} or one after it, which Drake refuses ({error}),")]
     for link, name, kind in others:
         shapes.setdefault(link, []).append(Shape(kind, (), Placement(), name=name))
     return shapes
 
 
-def _read(text: str) -> dict[str, list[Shape]] | None:
-    """The visuals of a document that has only those that Drake reads; None if it refuses one."""
+def _read(text: str) -> dict[str, list[Shape]]:
+    """The visuals of a document that has only those that Drake reads, or DescriptionError if it refuses one."""
     from pydrake.multibody.parsing import Parser
     from pydrake.multibody.plant import AddMultibodyPlantSceneGraph
     from pydrake.multibody.tree import BodyIndex
@@ -54,8 +63,8 @@ def _read(text: str) -> dict[str, list[Shape]] | None:
     try:
         with warnings_of_drake(shown=False):
             parser.AddModelsFromString(text, "sdf")
-    except (Exception, SystemExit):  # SystemExit: assertions of Drake
-        return None
+    except (Exception, SystemExit) as error:  # SystemExit: assertions of Drake
+        raise DescriptionError(" ".join(str(error).split())) from error
     inspector, shapes = scene.model_inspector(), {}
     for number in range(plant.num_bodies()):
         body = plant.get_body(BodyIndex(number))
