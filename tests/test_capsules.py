@@ -167,6 +167,28 @@ def test_without_round_shapes_the_others_are_named() -> None:
         robot_capsules(sr.InflatableArm())  # type: ignore[arg-type]
 
 
+ARM = """<mujoco><worldbody><geom type="plane" size="1 1 1"/><body name="arm" pos="0 0 1">
+<joint name="j" axis="0 1 0" stiffness="5"/>
+<geom type="capsule" fromto="0.1 0 0 0.5 0 0" size=".05"/><geom type="cylinder" size=".1 .2" pos="0 0 .3"/>
+<geom type="box" size=".1 .2 .3"/><geom type="sphere" size=".9" contype="0" conaffinity="0"/></body></worldbody></mujoco>"""
+BALL_ARM = """<sdf version="1.9"><model name="m"><link name="arm"><pose>0 0 1 0 0 0</pose>
+<collision name="c"><pose>0.3 0 0 0 TURN 0</pose>
+<geometry><capsule><radius>0.05</radius><length>0.4</length></capsule></geometry></collision>
+<collision name="d"><pose>0 0 .3 0 0 0</pose><geometry><cylinder><radius>.1</radius><length>.4</length></cylinder></geometry>
+</collision></link><joint name="j" type="revolute"><parent>world</parent><child>arm</child><axis><xyz>0 1 0</xyz><dynamics>
+<spring_stiffness>5</spring_stiffness></dynamics></axis></joint></model></sdf>""".replace("TURN", repr(math.pi / 2))
+
+
+@pytest.mark.parametrize(("package", "text"), [("mujoco", ARM), ("pydrake", BALL_ARM)])
+def test_round_collision_shapes_of_mjcf_and_sdf_are_capsules(package: str, text: str, tool: Callable) -> None:
+    """In the axes of the joint, which is at the origin of the link; 1e-12: rounding of quaternions."""
+    tool(package)
+    found = robot_capsules(sr.load_model(text))
+    assert [(one.link, one.joint, one.radius) for one in found] == [("arm", 1, 0.05), ("arm", 1, 0.1)]
+    ends = [sorted([tuple(one.start.round(12) + 0.0), tuple(one.end.round(12) + 0.0)]) for one in found]
+    assert ends == [[(0.1, 0, 0), (0.5, 0, 0)], [(0, 0, 0.1), (0, 0, 0.5)]]
+
+
 def tagged(**attributes: str | None) -> str:
     """The bar with a capsule of which some attributes differ."""
     good: dict[str, Any] = {"link": "bar", "start": "0 0 0", "end": "0 0 1", "radius": "0.1"}

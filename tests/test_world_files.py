@@ -223,6 +223,13 @@ BALL = '<geom size=".1"/>'
         ("a.urdf", URDF.replace('scale="1 1 2"', 'scale="1 1 -2"'), "the collision shape 1 of wedge: scale"),
         ("a.urdf", URDF.replace('radius="0.1"', 'radius="0"'), "the collision shape 2 of pole: radius"),
         ("a.urdf", URDF.replace('<sphere radius="0.1"/>', "<torus/>"), "a.urdf cannot be read: link pole has a shape torus"),
+        (
+            "a.urdf",
+            URDF.replace('link="wedge" start', 'link="edge" start'),
+            "a.urdf has a capsule of a link 'edge'; available: world",
+        ),
+        ("a.urdf", URDF.replace('start="0 0 0"', 'start="0 0 nan"'), "the collision shape 2 of wedge: "),
+        ("a.urdf", URDF.replace('start="0 0 0"', 'start="0 0"'), "a.urdf cannot be read: start = '0 0'; 3 numbers"),
         ("a.urdf", '<robot name="r"><link name="a"/></robot>', "a.urdf has no collision shapes; one or more"),
         ("a.urdf", "<!DOCTYPE x>" + URDF, "declares a document type"),
         ("a.urdf", "<html/>", "has the root tag <html>"),

@@ -13,7 +13,7 @@ from softrobots.core.checks import LARGEST, FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import parse_xml
 from softrobots.description.rigid_tree import SOLIDS, Body, Joint, Placement, RigidTree, Shape, number_text
-from softrobots.description.urdf_tags import NAMESPACE, SpringTag
+from softrobots.description.urdf_tags import NAMESPACE, CapsuleTag, SpringTag
 
 _SHAPES = (*SOLIDS, "mesh")
 _ENTRIES = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")  # of the inertia, row by row
@@ -30,6 +30,7 @@ def read_rigid_tree(urdf: str, source: str = "the URDF") -> RigidTree:
         colours = {element.get("name", ""): element.find("color") for element in root.iter("material") if len(element)}
         bodies = {element.get("name", ""): _body(element, colours) for element in root.findall("link")}
         joints = [_joint(element) for element in root.findall("joint")]
+        capsules = tuple(_capsule(element) for element in root.findall(f"{{{NAMESPACE}}}capsule"))
     except (ValueError, IndexError) as error:
         raise DescriptionError(f"{source} cannot be read: {error}") from error
     carried = {joint.child for joint in joints}
@@ -43,7 +44,7 @@ def read_rigid_tree(urdf: str, source: str = "the URDF") -> RigidTree:
         order += [joint.child for joint in below]
     if len(order) != len(bodies) or any(name not in bodies for name in order):
         raise DescriptionError(f"{source} is no tree: {len(order)} of its {len(bodies)} links are connected to {roots[0]}")
-    return RigidTree(root.get("name", ""), tuple(bodies[name] for name in order), tuple(ordered), {})
+    return RigidTree(root.get("name", ""), tuple(bodies[name] for name in order), tuple(ordered), {}, capsules=capsules)
 
 
 def write_rigid_tree(tree: RigidTree) -> str:
@@ -153,6 +154,11 @@ def _joint(element: Element) -> Joint:
         float(_numbers(dynamics, "friction", "0")[0]),
         float(_numbers(element.find(f"{{{NAMESPACE}}}rotor"), "inertia", "0")[0]),
     )
+
+
+def _capsule(element: Element) -> CapsuleTag:
+    (x, y, z), (u, v, w) = (_numbers(element, name, "0 0 0").tolist() for name in ("start", "end"))
+    return CapsuleTag(element.get("link", ""), (x, y, z), (u, v, w), float(_numbers(element, "radius", "0")[0]))
 
 
 def link_at(joint: Element, end: str) -> str:

@@ -11,10 +11,12 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_number, instance_of
-from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
+from softrobots.core.files import as_path
 from softrobots.core.yaml_text import yaml_of
 from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
+from softrobots.environment.world_files import PLAIN_DATA, read_obstacles, read_plain_data
 
 KINDS: dict[str, type[Obstacle]] = {kind.kind: kind for kind in (HalfSpace, Sphere, Box, Cylinder, Capsule, Mesh)}
 """Obstacles by their kind in plain data."""
@@ -206,9 +208,14 @@ class Environment:
             DescriptionError: If a world cannot be read, has no collision shapes or one that is not read, or a joint moves.
             MissingDependency: If MuJoCo or Drake is needed and not installed.
         """
-        from softrobots.environment.world_files import read_environment  # which makes environments
-
-        return read_environment(path, hull=hull)
+        file = as_path("path", path)
+        if file.suffix.lower() not in PLAIN_DATA:
+            return cls(read_obstacles(file, hull=hull))
+        data = read_plain_data(file)
+        try:
+            return cls.from_dict(data)
+        except (FileFormatError, NameNotFound, ParameterError) as error:
+            raise FileFormatError(f"cannot read obstacles from {file}: {error}") from error
 
 
 def check_environment(environment: Any) -> Environment:

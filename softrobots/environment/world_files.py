@@ -1,16 +1,14 @@
-"""Environments from files: worlds in URDF, SDF or MJCF, and plain data in YAML or JSON."""
+"""Obstacles from files: worlds in URDF, SDF or MJCF, and plain data in YAML or JSON."""
 
 from __future__ import annotations
 
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.bounded_reading import read_text
-from softrobots.core.errors import DescriptionError, FileFormatError, NameNotFound, ParameterError
-from softrobots.core.files import as_path
+from softrobots.core.errors import DescriptionError, FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
 from softrobots.core.xml_input import read_xml
 from softrobots.core.yaml_text import parse_yaml
@@ -18,9 +16,10 @@ from softrobots.description.mesh_files import with_absolute_paths
 from softrobots.description.readers import read_world
 from softrobots.description.rigid_tree import Placement, RigidTree, Shape
 from softrobots.environment.convex_mesh import Mesh
-from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 
+PLAIN_DATA = (".yaml", ".yml", ".json")
+"""What names of files of plain data end with."""
 LARGEST_FILE = 10_000_000
 """Largest size of a file of plain data [bytes]."""
 
@@ -28,22 +27,32 @@ _DEEPEST, _MOST_VALUES = 6, 50_000  # of YAML: rows of corners in an obstacle in
 _READ = ("box", "cylinder", "sphere", "capsule", "mesh", "plane")
 
 
-def read_environment(path: str | os.PathLike[str], *, hull: bool = False) -> Environment:
-    """Read the obstacles of a file; see `Environment.from_file`."""
-    file = as_path("path", path)
-    if file.suffix.lower() in (".yaml", ".yml", ".json"):
-        text = read_text(file, LARGEST_FILE)
-        try:
-            json = file.suffix.lower() == ".json"
-            data = parse_json(text) if json else parse_yaml(text, deepest=_DEEPEST, most=_MOST_VALUES)
-            return Environment.from_dict(_beside(data, file.parent))
-        except (FileFormatError, ParameterError, NameNotFound) as error:
-            raise FileFormatError(f"cannot read obstacles from {file}: {error}") from error
+def read_plain_data(file: Path) -> Any:
+    """Return the data of a file in YAML, or JSON if its name ends so, with files of meshes relative to it.
+
+    Raises:
+        FileFormatError: If it cannot be read.
+    """
+    text = read_text(file, LARGEST_FILE)
+    json = file.suffix.lower() == ".json"
+    try:
+        return _beside(parse_json(text) if json else parse_yaml(text, deepest=_DEEPEST, most=_MOST_VALUES), file.parent)
+    except FileFormatError as error:
+        raise FileFormatError(f"cannot read obstacles from {file}: {error}") from error
+
+
+def read_obstacles(file: Path, *, hull: bool = False) -> list[Obstacle]:
+    """Return the collision shapes of a world in URDF, SDF or MJCF as obstacles; see `Environment.from_file`.
+
+    Raises:
+        DescriptionError: If it cannot be read, has no collision shapes or one that is not read, or a joint moves.
+        MissingDependency: If MuJoCo or Drake is needed and not installed.
+    """
     tree = read_world(with_absolute_paths(read_xml(file), file.parent), str(file), file)
     obstacles = _obstacles(tree, str(file), hull)
     if not obstacles:
         raise DescriptionError(f"{file} has no collision shapes; one or more are required: {', '.join(_READ)}")
-    return Environment(obstacles)
+    return obstacles
 
 
 def _beside(data: Any, folder: Path) -> Any:

@@ -20,6 +20,8 @@ import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace
 from softrobots.core.checkpoint import CASE, Checkpoint
+from softrobots.core.yaml_text import parse_yaml
+from softrobots.environment.obstacle_fields import obstacle_fields
 from softrobots.helix import ActuatorTable, HelixDesign, design_grasp
 from softrobots.identification.measurement_columns import read_columns
 from softrobots.robots.parameter_file import read_parameters, read_robot, write_parameters
@@ -201,22 +203,24 @@ def read_parameter_file(file: Path) -> None:
 def environment_corpus() -> list[bytes]:
     """Every kind of obstacle, as it is written, and by hand."""
     turn = np.array([[0.0, -1.0, 0.0], [1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
-    round_ones = [Cylinder(0.1, 0.5, rotation=turn), Capsule(0.1, 0.5, (1, 2, 3)), Sphere(0.2, (0, 1, 0), name="ball")]
+    round_ones = [sr.Cylinder(0.1, 0.5, rotation=turn), sr.Capsule(0.1, 0.5, (1, 2, 3)), sr.Sphere(0.2, (0, 1, 0), name="ball")]
     corners = [(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)]
-    all_kinds = Environment([HalfSpace((0, 0, 1), -0.5), Box((1, 2, 3), rotation=turn), *round_ones, Mesh(corners)])
-    by_hand = b"# a shelf\nobstacles:\n- kind: box\n  size: [1, 0.5, 2e-2]\n  name: shelf\n- {kind: half_space, normal: [0, 0, 1]}\n"
+    all_kinds = sr.Environment([sr.HalfSpace((0, 0, 1), -0.5), sr.Box((1, 2, 3), rotation=turn), *round_ones, sr.Mesh(corners)])
+    by_hand = (
+        b"# a shelf\nobstacles:\n- kind: box\n  size: [1, 0.5, 2e-2]\n  name: shelf\n- {kind: half_space, normal: [0, 0, 1]}\n"
+    )
     return [all_kinds.to_yaml().encode(), by_hand, b"obstacles: []\nself_contact: true\n"]
 
 
 @cache
 def environment_json_corpus() -> list[bytes]:
     """The same as JSON."""
-    return [json.dumps(yaml.safe_load(text)).encode() for text in environment_corpus()]
+    return [json.dumps(parse_yaml(text.decode(), deepest=6)).encode() for text in environment_corpus()]
 
 
 def read_environment_file(file: Path) -> None:
     """Obstacles, and their distances from a point."""
-    environment = Environment.from_file(file)
+    environment = sr.Environment.from_file(file)
     for field, _ in obstacle_fields(environment):
         finite(*field.distance(np.array([[3.0, 2.0, 1.0]])))
 

@@ -149,7 +149,8 @@ def world_corpus() -> list[bytes]:
 def mjcf_world_corpus() -> list[bytes]:
     """Every kind of shape that is read, and one that is not seen."""
     return [
-        b'<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1" euler="10 0 0"/><geom type="sphere" size=".3" pos="2 0 0"/>'
+        b'<mujoco><worldbody><geom name="floor" type="plane" size="1 1 .1" euler="10 0 0"/>'
+        b'<geom type="sphere" size=".3" pos="2 0 0"/>'
         b'<body name="post" pos="1 0 0" euler="0 30 0"><geom type="capsule" fromto="0 0 0 0 0 1" size=".1"/>'
         b'<geom type="box" size=".1 .2 .3" contype="0"/><body pos="0 .5 0"><geom type="cylinder" size=".1 .4"/></body></body>'
         b"</worldbody></mujoco>"
@@ -161,8 +162,9 @@ def sdf_world_corpus() -> list[bytes]:
     return [
         b'<sdf version="1.9"><world name="w"><model name="g"><static>true</static><link name="l"><collision name="c"><geometry>'
         b"<plane><normal>0 0 1</normal></plane></geometry></collision></link></model>"
-        b'<model name="s"><static>true</static><pose>1 0 0 0 .1 0</pose><link name="l"><collision name="c"><pose>0 0 1 0 0 0</pose>'
-        b'<geometry><box><size>1 1 .1</size></box></geometry></collision><collision name="d"><geometry><capsule><radius>.1</radius>'
+        b'<model name="s"><static>true</static><pose>1 0 0 0 .1 0</pose><link name="l"><collision name="c">'
+        b"<pose>0 0 1 0 0 0</pose><geometry><box><size>1 1 .1</size></box></geometry></collision>"
+        b'<collision name="d"><geometry><capsule><radius>.1</radius>'
         b"<length>.5</length></capsule></geometry></collision></link></model></world></sdf>"
     ]
 

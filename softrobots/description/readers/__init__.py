@@ -16,8 +16,7 @@ from softrobots.description.readers.mjcf import read_mjcf
 from softrobots.description.readers.sdf import read_sdf
 from softrobots.description.rigid_tree import RigidTree, capsule_shape
 from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
-from softrobots.description.tag_reader import read_tags
-from softrobots.description.urdf_structure import check_link_count
+from softrobots.description.urdf_structure import check_link_count, check_structure
 
 KINDS: Mapping[str, str] = {"robot": "URDF", "mujoco": "MJCF", "sdf": "SDF"}
 """Formats by root tag."""
@@ -56,12 +55,15 @@ def read_world(text: str, source: str, path: Path | None = None) -> RigidTree:
 
     Capsules in the tags of this package are among the collision shapes.
     """
-    if (tag := str(parse_xml(text, source).tag)) in _READERS:
-        return _READERS[tag](text, source, path)
-    capsules = read_tags(to_urdf(text, source), source).capsules  # refuses other formats, and what is no URDF
+    root = parse_xml(text, source)
+    if root.tag in _READERS:
+        return _READERS[str(root.tag)](text, source, path)
+    to_urdf(text, source)  # refuses other formats
+    check_structure(root, source)
     tree = read_rigid_tree(text, source)
-    bodies = (
-        replace(body, collisions=(*body.collisions, *(capsule_shape(tag) for tag in capsules if tag.link == body.name)))
-        for body in tree.bodies
-    )
-    return replace(tree, bodies=tuple(bodies))
+    owned = {body.name: tuple(capsule_shape(tag) for tag in tree.capsules if tag.link == body.name) for body in tree.bodies}
+    astray = sorted({tag.link for tag in tree.capsules} - owned.keys())
+    if astray:
+        raise DescriptionError(f"{source} has a capsule of a link {', '.join(astray)!r}; available: {', '.join(owned)}")
+    bodies = tuple(replace(body, collisions=body.collisions + owned[body.name]) for body in tree.bodies)
+    return replace(tree, bodies=bodies)
