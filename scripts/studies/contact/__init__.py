@@ -1,0 +1,1 @@
+"""Grips of robots around objects; see scripts/helix_grip.py."""
