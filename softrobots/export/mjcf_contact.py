@@ -54,9 +54,9 @@ def capsule_bits(contact: ContactShapes) -> dict[str, str]:
     return {"contype": str(among), "conaffinity": str(_OBSTACLES | among)}
 
 
-def steadying_armature(damping: float) -> float:
-    """Return the armature of a spring joint with a damping [N m s/rad or N s/m] with which contacts come to rest."""
-    return 2.0 * _TIME_STEP * damping
+def steadying_armature(damping: float, time_step: float = _TIME_STEP) -> float:
+    """Return the armature of a joint with a damping [N m s/rad or N s/m] with which contacts rest, for a time step [s]."""
+    return 2.0 * time_step * damping
 
 
 def write_obstacles(world: ElementTree.Element, contact: ContactShapes) -> None:

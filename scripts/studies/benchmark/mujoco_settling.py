@@ -67,6 +67,9 @@ def require_mujoco() -> Any:
 class SettlingArm:
     """A robot in MuJoCo, whose motors stand where they are put."""
 
+    tolerance = TOLERANCE
+    """See `TOLERANCE`."""
+
     def __init__(self, model: SoftModel) -> None:
         """Make MuJoCo's models.
 
@@ -114,7 +117,7 @@ class SettlingArm:
         data.qpos[:] = model.qpos_spring
         moment = self._apply(q_motors, force)
         damping = float(model.dof_damping[0])
-        slow = TOLERANCE * moment / damping
+        slow = self.tolerance * moment / damping
         steps, speed = 0, math.inf
         while steps < _MOST:
             mujoco.mj_step(model, data, nstep=self.stride)
