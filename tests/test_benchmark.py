@@ -16,7 +16,16 @@ import pytest
 
 import softrobots as sr
 from softrobots.statics.kinematics import frame_placement
-from studies.benchmark import cases, compiled_solvers, motion_jobs, mujoco_settling, pinocchio_solvers, processes, tendon_jobs
+from studies.benchmark import (
+    cases,
+    compiled_solvers,
+    contact_jobs,
+    motion_jobs,
+    mujoco_settling,
+    pinocchio_solvers,
+    processes,
+    tendon_jobs,
+)
 from studies.benchmark.aligned_joints import aligned_joints
 from studies.benchmark.cases import FORCE, ROD_LENGTH, ROD_STIFFNESS, path_targets, rod, rod_forces, standard_cases
 from studies.benchmark.comparison import Comparison, Settings, figure, quick_settings
@@ -352,6 +361,40 @@ def test_elastic_tendons_are_compared_with_mujoco(tool: Callable, stand_in: list
     monkeypatch.setattr(tendon_jobs, "_NEAR", 1e-5)
     rows = measure(QUICK, ["tendons"]).rows
     assert all("is off by" in row.skipped for row in rows[2:])
+
+
+@pytest.mark.study
+def test_equilibria_in_contact_are_compared_with_mujoco(tool: Callable, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its forces are compared with ours on its robot before anything is timed; settings that are too soft are passed over."""
+    tool("mujoco")
+    scene = contact_jobs.leaning_arm(2)
+    monkeypatch.setattr(contact_jobs, "TIME_STEPS", (0.002, 0.01))
+    monkeypatch.setattr(contact_jobs, "LARGE_STEPS", ())
+    monkeypatch.setattr(contact_jobs, "leaning_arm", lambda count: scene._replace(dampings=(16.0,)))
+    monkeypatch.setattr(contact_jobs, "lying_rod", lambda count, sections: scene._replace(dampings=(16.0,), name="again"))
+    results = measure(QUICK, ["contact"])
+    assert [row.skipped for row in results.rows] == [""] * 8
+    assert [row.target for row in results.rows] == 2 * [5e-4, 20.0, None, None]
+    assert sum("time step 0.01 s" in note for note in results.notes) == 4
+    monkeypatch.setattr(contact_jobs, "FORCE_TOLERANCE", 3e-6)
+    assert sum("time step 0.002 s" in note for note in measure(QUICK, ["contact"]).notes) == 4
+
+
+@pytest.mark.study
+def test_a_rod_on_pegs_presses_on_them_as_in_mujoco(tool: Callable) -> None:
+    """A rod of few sections lies on some of ten pegs; MuJoCo settles to our forces on the same hinges."""
+    tool("mujoco")
+    scene = contact_jobs.lying_rod(2, 6)
+    simulator = contact_jobs.SettlingSurroundings(scene)
+    for case in zip(*scene.cases, strict=True):
+        simulator.settle(*case)
+        found = scene.solve(scene.theirs, *case)
+        forces = simulator.obstacle_forces(scene.environment.names)
+        assert sum(contact.strict for contact in found.contacts) > 2
+        assert (
+            np.abs(forces - contact_jobs.stacked(contact_jobs.forces_of(found), scene.environment.names)).max()
+            < 1e-3 * forces.max()
+        )
 
 
 def test_mujoco_settles_to_where_tendons_and_weight_say(tool: Callable) -> None:

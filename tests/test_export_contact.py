@@ -16,6 +16,7 @@ import pytest
 from scipy.optimize import root
 
 import softrobots as sr
+from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Surroundings
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
@@ -128,6 +129,7 @@ def around(reach: float) -> Environment:
             Box((0.1, 0.2, 0.3), (0.4, 0.6, 0.5), turned),
             Cylinder(0.1, 0.3, (0.5, -0.6, -0.6), turned),
             Capsule(0.05, 0.3, (-0.6, 0.2, -0.6), turned, pose=np.eye(4)),
+            Mesh(0.2 * turned[:, [0, 1, 2, 0]].T * [[1], [1], [1], [-1]], (-0.3, -0.6, 0.6)),
         ]
     )
 
@@ -203,6 +205,21 @@ def test_robots_without_capsules_and_names_that_sdf_reserves_are_refused() -> No
             write(bare, environment=Environment([Sphere(1.0)]))
     with pytest.raises(sr.DescriptionError, match="obstacles named world"):
         to_sdf(levers(), environment=Environment([Sphere(1.0, name="world")]))
+
+
+def test_meshes_of_drake_stand_beside_its_file(tmp_path: Path) -> None:
+    """Named by their content: the same mesh is one file, whose corners and number of triangles are those of a tetrahedron."""
+    corners = np.array([(0, 0, 0), (1, 0, 0), (0, 1, 0), (0, 0, 1)], dtype=float)
+    twice = Environment([Mesh(corners), Mesh(corners, (2.0, 0.0, 0.0))])
+    with pytest.raises(sr.ParameterError, match="a folder for the file of mesh_1"):
+        to_sdf(levers(), environment=twice)
+    for _ in range(2):
+        text = export_model(levers(), tmp_path / "levers.sdf", environment=twice, overwrite=True).read_text()
+    (file,) = tmp_path.glob("*.obj")
+    assert text.count(file.as_uri()) == 4  # visual and collision of both
+    rows = [line.split() for line in file.read_text().splitlines()]
+    assert sorted(tuple(map(float, row[1:])) for row in rows if row[0] == "v") == sorted(map(tuple, corners.tolist()))
+    assert sum(row[0] == "f" for row in rows) == 4
 
 
 def test_the_sidecar_holds_the_obstacles(tmp_path: Path) -> None:

@@ -17,6 +17,7 @@ from softrobots.core.checks import FloatArray, non_negative_number, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import Placement, RigidTree, Shape
 from softrobots.description.urdf_tags import CapsuleTag
+from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacles import Box, HalfSpace, Obstacle
 
@@ -29,6 +30,8 @@ class ContactShapes:
 
     obstacles: Mapping[str, Shape]
     """Shape by name of the obstacle; "plane" has its surface at z = 0 and nothing above it, "capsule" radius and length."""
+    meshes: Mapping[str, Mesh]
+    """Those whose shape is a "mesh", by name."""
     friction: float
     """Coefficient of friction."""
     self_contact: bool
@@ -56,6 +59,7 @@ def contact_shapes(environment: Any, friction: Any) -> ContactShapes | None:
     checked = fixed_environment(environment)
     return ContactShapes(
         obstacles={str(obstacle.name): _shape(obstacle) for obstacle in checked},
+        meshes={str(obstacle.name): obstacle for obstacle in checked if isinstance(obstacle, Mesh)},
         friction=coefficient,
         self_contact=checked.self_contact,
     )
@@ -90,7 +94,8 @@ def _capsule(tag: CapsuleTag) -> Shape:
 def _shape(obstacle: Obstacle) -> Shape:
     transform = obstacle.transform_to_world
     placement = Placement(read_only(transform[:3, 3].copy()), read_only(transform[:3, :3].copy()))
-    size: Any = obstacle.size if isinstance(obstacle, Box) else [getattr(obstacle, name, None) for name in ("radius", "length")]
+    sizes = (getattr(obstacle, name, None) for name in ("radius", "length"))
+    size: Any = obstacle.size if isinstance(obstacle, Box) else (1.0, 1.0, 1.0) if isinstance(obstacle, Mesh) else sizes
     kind = "plane" if isinstance(obstacle, HalfSpace) else obstacle.kind
     return Shape(kind, tuple(float(value) for value in size if value is not None), placement, _COLOUR)
 

@@ -55,8 +55,8 @@ def export_model(
         path: The file.
         format: Name of the format, one of `FORMATS`; by default from the suffix of the file, if only one format has it.
         overwrite: Whether a file that exists may be replaced.
-        options: For the exporter: `q_motors`, `actuators`, `damping`, `gravity`, `limits`, `environment`, `friction`, `robot`;
-            see `to_mjcf` ...
+        options: For the exporter: `q_motors`, `actuators`, `damping`, `gravity`, `limits`, `environment`, `friction`,
+            `mesh_folder`, `robot`; see `to_mjcf` ...
 
     Returns:
         The path.
@@ -81,6 +81,8 @@ def export_model(
     model = source if isinstance(source, SoftModel) else load_model(source)
     if "robot" in chosen.options and isinstance(source, XacroRobot):
         options = {"robot": source} | options
+    if "mesh_folder" in chosen.options:
+        options = {"mesh_folder": Path(path).absolute().parent} | options
     return write_text(path, chosen.write(model, **options), overwrite=overwrite)
 
 

@@ -104,7 +104,7 @@ def to_mjcf(
     world = ElementTree.SubElement(root, "worldbody")
     bodies.write(world)
     if robot.contact is not None:
-        write_obstacles(world, robot.contact)
+        write_obstacles(world, assets, robot.contact)
     if not len(assets):
         root.remove(assets)
     pairs = neighbours(robot.tree) if robot.contact is None or robot.contact.self_contact else ()

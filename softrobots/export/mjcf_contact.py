@@ -59,10 +59,15 @@ def steadying_armature(damping: float, time_step: float = _TIME_STEP) -> float:
     return 2.0 * time_step * damping
 
 
-def write_obstacles(world: ElementTree.Element, contact: ContactShapes) -> None:
-    """Write the obstacles as geoms of the world with their names."""
+def write_obstacles(world: ElementTree.Element, assets: ElementTree.Element, contact: ContactShapes) -> None:
+    """Write the obstacles as geoms of the world with their names; corners of meshes stand in the file."""
     for name, shape in contact.obstacles.items():
-        attributes = {"name": name, "type": shape.kind, **solid_size(shape), **where(shape.placement)}
+        measure = solid_size(shape)
+        if name in contact.meshes:
+            measure = {"mesh": f"obstacle/{name}"}  # the name of no file
+            corners = number_text(contact.meshes[name].vertices.ravel())
+            ElementTree.SubElement(assets, "mesh", {"name": measure["mesh"], "vertex": corners})
+        attributes = {"name": name, "type": shape.kind, **measure, **where(shape.placement)}
         bits = {"contype": str(_OBSTACLES), "conaffinity": "0"}
         ElementTree.SubElement(world, "geom", attributes | {"rgba": number_text(shape.rgba or ())} | bits)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -34,6 +35,7 @@ def to_sdf(
     limits: bool = True,
     environment: Environment | None = None,
     friction: float = 0.0,
+    mesh_folder: str | os.PathLike[str] | None = None,
 ) -> str:
     """Write a robot as a model of SDF 1.9.
 
@@ -63,6 +65,8 @@ def to_sdf(
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
         environment: Obstacles around the robot, which stand still.
         friction: Coefficient of friction between the robot and them.
+        mesh_folder: Folder for OBJ files of obstacles that are meshes, named by their content; `export_model` takes that of the
+            SDF file.
 
     Returns:
         SDF text.
@@ -70,9 +74,10 @@ def to_sdf(
     Raises:
         ParameterError: If an argument does not fit, muscles are to be driven, or the robot has sections of constant strain,
             springs that are not linear, or muscles that are no joint springs when they are welded. If obstacles move or are
-            meshes that Drake cannot read, or friction is given without any.
+            meshes without a folder, or friction is given without any.
         DescriptionError: If the robot has moving links without mass, a link and a joint of one name or of a name that SDF
             reserves, or more joints than Pinocchio supports.
+        OutputError: If the file of a mesh cannot be written.
     """
     robot = prepare(model, q_motors, actuators=actuators, damping=damping, environment=environment, friction=friction)
     if model.muscles and actuators == "driven":
@@ -93,7 +98,7 @@ def to_sdf(
     name, parent = tree.name or "robot", root
     if robot.contact is not None:
         parent = ElementTree.SubElement(root, "world", {"name": f"{name}_with_surroundings"})
-        write_obstacles(parent, robot.contact)
+        write_obstacles(parent, robot.contact, mesh_folder)
     writer = _Model(ElementTree.SubElement(parent, "model", {"name": name}), robot, limits)
     writer.write()
     return document(root, _head(robot, writer.meshes, limits))

@@ -7,8 +7,15 @@ softer at large time steps. A pair of shapes has one contact. Gazebo does not re
 
 from __future__ import annotations
 
+import hashlib
 import xml.etree.ElementTree as ElementTree
+from pathlib import Path
+from typing import Any
 
+from softrobots.core.errors import ParameterError
+from softrobots.core.files import as_path, write_text
+from softrobots.description.rigid_tree import number_text
+from softrobots.environment.convex_mesh import Mesh
 from softrobots.export.contact_shapes import ContactShapes
 from softrobots.export.sdf_parts import DRAKE, write_colour, write_geometry, write_number, write_pose
 
@@ -24,20 +31,36 @@ HARDNESS = f"Contact in Drake is a spring of {0.5 * STIFFNESS:g} N/m, with the d
 """How stiff contact is, for the head of the file."""
 
 
-def write_obstacles(world: ElementTree.Element, contact: ContactShapes) -> None:
-    """Write a static model of the obstacles, a link for each."""
+def write_obstacles(world: ElementTree.Element, contact: ContactShapes, mesh_folder: Any) -> None:
+    """Write a static model of the obstacles, a link for each, and files of meshes into a folder.
+
+    Raises:
+        ParameterError: If there are meshes, and no folder.
+        OutputError: If a file cannot be written.
+    """
     model = ElementTree.SubElement(world, "model", {"name": SURROUNDINGS})
     ElementTree.SubElement(model, "static").text = "true"
     for name, shape in contact.obstacles.items():
+        file = _mesh_file(contact.meshes[name], name, mesh_folder) if name in contact.meshes else None
         link = ElementTree.SubElement(model, "link", {"name": name})
         write_pose(link, shape.placement)
         for kind in ("visual", "collision"):
             element = ElementTree.SubElement(link, kind, {"name": kind})
-            write_geometry(element, shape, None)
+            write_geometry(element, shape, file, convex=True)
             if kind == "visual" and shape.rgba is not None:
                 write_colour(element, shape.rgba)
             if kind == "collision":
                 write_hardness(element, contact.friction)
+
+
+def _mesh_file(mesh: Mesh, name: str, folder: Any) -> Path:
+    """Write a mesh as OBJ, named by its content, unless it is there already; return the file."""
+    if folder is None:
+        raise ParameterError("mesh_folder", folder, f"a folder for the file of {name}: SDF has no meshes without files")
+    lines = [f"v {number_text(corner)}" for corner in mesh.vertices]
+    text = "\n".join([*lines, *(f"f {a} {b} {c}" for a, b, c in (mesh.triangles + 1).tolist())]) + "\n"
+    path = as_path("mesh_folder", folder).absolute() / f"mesh_{hashlib.sha256(text.encode()).hexdigest()[:16]}.obj"
+    return path if path.is_file() else write_text(path, text, overwrite=False)
 
 
 def write_hardness(collision: ElementTree.Element, friction: float) -> None:

@@ -16,12 +16,14 @@ WORLD = "world"
 """Name of the world in SDF."""
 
 
-def write_geometry(element: ElementTree.Element, shape: Shape, file: Path | None) -> None:
-    """Write a shape; `file` is that of a mesh."""
+def write_geometry(element: ElementTree.Element, shape: Shape, file: Path | None, *, convex: bool = False) -> None:
+    """Write a shape; `file` is that of a mesh, which Drake shall take for convex or not."""
     geometry = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
     if file is not None:
         ElementTree.SubElement(geometry, "uri").text = file.as_uri()
         ElementTree.SubElement(geometry, "scale").text = number_text(shape.size)
+        if convex:
+            ElementTree.SubElement(geometry, f"{{{DRAKE}}}declare_convex")
     elif shape.kind == "box":
         ElementTree.SubElement(geometry, "size").text = number_text(shape.size)
     elif shape.kind == "plane":

@@ -137,7 +137,7 @@ def lying_rod(count: int, sections: int) -> Scene:
     cases = LoadCases(np.zeros((count, 0)), forces)
     name = f"rod of {sections} sections on {PEGS} pegs"
     hinges = f"a rod of {sections} pairs of hinges"
-    return Scene(name, ours, theirs, pegs, gravity, cases, (0.01, 0.03, 0.1, 0.3, 1.0), 2e-2, hinges)
+    return Scene(name, ours, theirs, pegs, gravity, cases, (0.3, 1.0, 3.0, 10.0, 30.0), 2e-2, hinges)
 
 
 def contact(settings: Settings) -> Outcome:

@@ -1,4 +1,4 @@
-"""Robots on obstacles: a wall, a ball, an edge, a rim and pegs. Nothing touches at rest; the load presses."""
+"""Robots on obstacles: a wall, a ball, an edge, a rim, a corner and pegs. Nothing touches at rest; the load presses."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from functools import lru_cache
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 from softrobots.model.loader import load_model
@@ -93,6 +94,8 @@ def _pegs() -> ContactCase:
     return ContactCase(lumped_arm(), TENSIONS, _ON_PEGS, Environment([*pegs, HalfSpace((1.0, 0.0, 0.0), -0.3)]))
 
 
+_PYRAMID = ((0.15, 0.03, 0.0), (-0.05, 0.12, 0.0), (-0.1, -0.12, 0.0), (0.01, -0.02, 0.1))
+
 CASES: Mapping[str, Callable[[], ContactCase]] = {
     "arm on a wall": lambda: _on(_ASIDE, lambda at: HalfSpace(_WALL, float(at @ _WALL) - 0.14)),
     "arm on a ball": lambda: _on(_DOWN, lambda at: Sphere(0.1, _under(at, 0.1) + (0.0, 0.03, 0.0))),
@@ -101,6 +104,7 @@ CASES: Mapping[str, Callable[[], ContactCase]] = {
     ),
     "arm on the rim of a cylinder": lambda: _on(_DOWN, lambda at: Cylinder(0.05, 0.2, _under(at, 0.12))),
     "arm on a capsule": lambda: _on(_DOWN, lambda at: Capsule(0.05, 0.2, _under(at, 0.05), _ALONG_Y)),
+    "arm on the corner of a mesh": lambda: _on(_DOWN, lambda at: Mesh(_PYRAMID, _under(at, 0.1))),
     "arm of muscles between pegs": _pegs,
 }
 """The cases by name."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tempfile
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
@@ -78,8 +79,16 @@ def settled(case: ContactCase, simulator: str, seconds: float = SECONDS) -> Outc
         )
         return mujoco_statics.simulate(Question(text, case.model.tip, case.force, case.gravity), seconds)
     if simulator == "Drake":
-        text = to_sdf(case.model, case.q_motors, actuators="welded", damping="critical", environment=case.environment)
-        return drake_statics.simulate(Question(text, case.model.tip, case.force, case.gravity), seconds)
+        with tempfile.TemporaryDirectory() as folder:
+            text = to_sdf(
+                case.model,
+                case.q_motors,
+                actuators="welded",
+                damping="critical",
+                environment=case.environment,
+                mesh_folder=folder,
+            )
+            return drake_statics.simulate(Question(text, case.model.tip, case.force, case.gravity), seconds)
     raise ParameterError("simulator", simulator, f"one of {', '.join(SIMULATORS)}")
 
 
