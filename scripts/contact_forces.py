@@ -18,7 +18,7 @@ from studies.contact_forces.comparison import SIMULATORS, as_data, compare, tabl
 from studies.shared.checkout import CHECKOUT
 from studies.shared.recorded_run import check_page, write_record
 
-NAME, PAGE = "contact_forces", "contact.md"
+NAME, PAGE = "contact_forces", "other_tools.md"
 
 
 def main(argv: list[str] | None = None) -> int:

@@ -28,7 +28,7 @@ def environments() -> list[dict[str, Any]]:
 def pages() -> list[str]:
     return [
         (CHECKOUT / "docs" / name).read_text(encoding="utf-8")
-        for name in ("validation.md", "agreement.md", "motion.md", "measured.md")
+        for name in ("validation.md", "agreement.md", "motion.md", "measured.md", "other_tools.md")
     ]
 
 
@@ -44,6 +44,7 @@ def pages() -> list[str]:
         "mutation",
         "input_shaping",
         "controllers",
+        "contact_forces",
         "measured_arm",
         "measured_families",
         "measured_fit",
