@@ -41,8 +41,7 @@ def contact_step(
     rows: FloatArray,
     held: Any,
     stiffness: FloatArray,
-    longest: float,
-    damping: float,
+    limits: tuple[float, float],
     factors: Any,
 ) -> Step | None:
     """Solve the quadratic programme of a step; where gaps cannot be kept, the deepest penetration shrinks as far as it can.
@@ -54,15 +53,15 @@ def contact_step(
         rows: Their gradients, shape (m, n).
         held: Which are taken to be pressed, shape (m,), truth values; the Hessian is made positive beside them.
         stiffness: Stiffness of the springs, shape (n,).
-        longest: Length of a step beyond which its components are limited to that, each by itself.
-        damping: Stiffness that is added to shorten the step, relative to the springs.
+        limits: Length of a step beyond which its components are limited to that, each by itself; and stiffness that is added
+            to shorten it, relative to the springs.
         factors: An `eigenpy.LDLT` of size n.
 
     Returns:
         The step; None if the solver fails.
     """
     soft = 1.0 / np.sqrt(stiffness)
-    gradients = rows * soft
+    gradients, (longest, damping) = rows * soft, limits
     pull = soft * load
     relative = scaled(hessian, stiffness)
     if damping:

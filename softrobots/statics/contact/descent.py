@@ -1,0 +1,203 @@
+r"""Search for an equilibrium in contact without friction: the energy is least under gaps of zero or more.
+
+.. math:: r(y) = \sum_i \lambda_i \frac{dg_i}{dy}, \qquad g_i \ge 0,\quad \lambda_i \ge 0,\quad \lambda_i g_i = 0
+
+Sequential quadratic programming with the exact Hessian of the Lagrangian (Nocedal and Wright, Numerical Optimization, 2006,
+chapter 18): each step solves a quadratic programme over the linearised gaps, and is halved until the energy plus a price on the
+deepest penetration has decreased; a step that leaves the surface is first brought back to it. Near the solution, where the
+pressed contacts no longer change, these are Newton's steps on the equations above.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import NamedTuple
+
+import numpy as np
+from eigenpy import LDLT
+
+from softrobots.core.checks import FloatArray
+from softrobots.model.springs import POSITIVE
+from softrobots.statics.contact.certificate import softest_motion
+from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step, repairing_step
+from softrobots.statics.contact.touch import NO_FORCES, TOUCHING, ForceTable, Touch
+from softrobots.statics.elastic_state import ElasticProblem, ElasticState, largest_residual, norm
+
+BALANCED = 1.0
+"""Error of an equilibrium, see `Near.error`."""
+
+_LARGEST_STEP = 0.5  # [rad], norm of one step; the linear model of a revolute chain is inaccurate beyond
+_ARMIJO = 1e-4  # share of the predicted decrease that a step must reach
+_SHORTEST = 1e-10  # share of a step below which it is not halved again
+_DEEP = 1e-2  # penetration that is repaired before energies count, relative to the reach
+_EXACT = 1e-12  # gap of a pressed contact that is zero, relative to the reach
+_LEAST_DAMPING = 0.02  # of the step after one that was cut, relative to the springs
+_ESCAPE = 0.1  # [rad], step out of an unstable equilibrium
+
+
+class Near(NamedTuple):
+    """A state among surfaces, and how far it is from equilibrium."""
+
+    state: ElasticState
+    """The state."""
+    touch: Touch
+    """The surfaces near it."""
+    error: float
+    """Largest of residual, penetration and gaps of forces, relative to what is required; 1 or less at an equilibrium."""
+
+    @property
+    def table(self) -> ForceTable:
+        """Its contact forces."""
+        return ForceTable(self.touch.gaps.keys, self.touch.forces)
+
+    @property
+    def load(self) -> FloatArray:
+        """Out-of-balance load without the contact forces, shape (n_springs,)."""
+        return self.state.residual + self.touch.pushes
+
+
+class ContactSearch:
+    """Steps of a robot towards an equilibrium in contact; belongs to the thread that created it."""
+
+    def __init__(self, problem: ElasticProblem, most: int) -> None:
+        """Take the robot under a load, with an environment, and a limit of evaluations."""
+        self.problem, self.most, self.spent = problem, most, 0
+        """The robot under its load, the limit, and the evaluations spent."""
+        self._stiffness, self._reach = problem.model.stiffness, problem.model.reach
+        self._factors, self._price, self._damping = LDLT(len(self._stiffness)), 0.0, 0.0
+
+    def near(self, springs: FloatArray, forces: ForceTable = NO_FORCES) -> Near | None:
+        """Evaluate elastic coordinates, shape (n_springs,), under contact forces; None beyond the range of a section."""
+        self.spent += 1
+        state = self.problem.state(springs, forces)
+        touch = state.touch
+        if touch is None or not math.isfinite(state.energy):
+            return None
+        values, pressed = touch.gaps.values, touch.forces > 0.0
+        gap = max(touch.penetration, float(values[pressed].max()) if pressed.any() else 0.0)
+        allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
+        return Near(state, touch, max(state.error / allowed, gap / (_EXACT * self._reach)))
+
+    def descend(self, here: Near) -> tuple[Near, bool]:
+        """Descend to an equilibrium; it leaves unstable ones.
+
+        Returns:
+            The last state; and whether it is a stable equilibrium.
+        """
+        while self.spent < self.most:
+            stable, step = False, None
+            if here.error > BALANCED:
+                step = self.step(here)
+            else:
+                stable, step = self._way_out(here)
+            found = None if step is None else self._along(here, step)
+            if found is None:
+                return here, stable
+            here = found
+        return here, False
+
+    def step(self, here: Near) -> Step | None:
+        """Step of the quadratic programme over the gaps that it can close."""
+        touch, values = here.touch, here.touch.gaps.values
+        sizes = np.sqrt(np.einsum("ij,ij->i", touch.rows, touch.rows))
+        near = np.flatnonzero(values <= _LARGEST_STEP * sizes)
+        rows, held = touch.rows[near], touch.forces[near] > 0.0
+        limits = _LARGEST_STEP, self._damping
+        found = contact_step(here.state.tangent, here.load, values[near], rows, held, self._stiffness, limits, self._factors)
+        if found is None:
+            return None
+        forces = np.zeros(len(values))
+        forces[near] = found.forces
+        return found._replace(forces=forces)
+
+    def repaired(self, here: Near) -> Near:
+        """Bring a robot that starts deep inside of obstacles towards their surface, bending it little."""
+        longest = _LARGEST_STEP
+        while here.touch.penetration > _DEEP * self._reach and longest > _SHORTEST and self.spent < self.most:
+            touch = here.touch
+            step = None if self.blocked(here) else repairing_step(touch.gaps.values, touch.rows, self._stiffness, longest)
+            if step is None:
+                break
+            promised = touch.penetration - max(0.0, -float((touch.gaps.values + touch.rows @ step).min()))
+            if promised < 1e-3 * touch.penetration:  # no way out to first order
+                break
+            trial = self.near(here.state.q_springs + step)
+            if trial is None or touch.penetration - trial.touch.penetration < 0.1 * promised:
+                longest *= 0.25
+            else:
+                here = trial
+        return here
+
+    def blocked(self, here: Near) -> bool:
+        """Whether something penetrates that no spring moves."""
+        deep = here.touch.gaps.values < -TOUCHING * self._reach
+        return bool(deep.any()) and not here.touch.rows[deep].any(axis=1).all()
+
+    def _way_out(self, here: Near) -> tuple[bool, Step | None]:
+        """Certify an equilibrium; or step out of an unstable one along its softest motion that the contacts leave.
+
+        Of two signs that are free the one with the positive largest component is taken, so that results repeat.
+        """
+        state, touch = here.state, here.touch
+        allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
+        curvature, motion = softest_motion(state.tangent, self._stiffness, touch, self._reach, allowed)
+        if curvature > -POSITIVE or not math.isfinite(curvature):
+            return curvature > POSITIVE, None
+        motion = motion * (_ESCAPE / norm(motion))
+        if motion[np.argmax(np.abs(motion))] < 0.0:
+            motion = -motion
+        for wanted in (motion, -motion):
+            step = nearest_step(wanted, touch.gaps.values, touch.rows, self._stiffness)
+            if step is not None and float(step @ state.tangent @ step) < 0.0 and norm(step) > 0.1 * norm(wanted):
+                return False, Step(step, touch.forces, False)
+        return False, None
+
+    def _along(self, here: Near, step: Step) -> Near | None:
+        """Go along a step as far as energy and penetration allow; None where nothing is gained any more."""
+        state, touch = here.state, here.touch
+        length = norm(step.step)
+        whole = step.step if length <= _LARGEST_STEP else step.step * (_LARGEST_STEP / length)
+        change = (
+            step.forces - touch.forces if length <= _LARGEST_STEP else (step.forces - touch.forces) * (_LARGEST_STEP / length)
+        )
+        deep = touch.penetration
+        closes = deep - max(0.0, -float((touch.gaps.values + touch.rows @ whole).min(initial=0.0)))
+        downhill = float(here.load @ whole)
+        price = max(2.0 * float(step.forces.sum()), 0.5 * self._price, 2.0 * downhill / closes if closes > 0.0 else 0.0)
+        predicted, self._price = downhill - price * closes, price
+        rounding = self.problem.rounding(state) + 1e-15 * price * self._reach
+        if predicted > -rounding:
+            predicted = min(0.0, 0.5 * float(whole @ state.tangent @ whole))
+        below = predicted > -rounding  # rounding of the energy: it says nothing, the error must shrink
+        exact = step.exact and length <= _LARGEST_STEP
+
+        def better(trial: Near | None, share: float) -> bool:
+            if trial is None:
+                return False
+            if below or (exact and share == 1.0 and trial.error <= 0.5 * here.error):
+                return BALANCED < here.error > trial.error
+            merit = trial.state.energy + price * trial.touch.penetration
+            return merit <= state.energy + price * deep + _ARMIJO * share * predicted + rounding
+
+        share, first = 1.0, self.spent
+        while self.spent < self.most and share > _SHORTEST:
+            table = ForceTable(touch.gaps.keys, touch.forces + share * change)
+            trial = self.near(state.q_springs + share * whole, table)
+            if share == 1.0 and trial is not None and not better(trial, share):
+                back = _back_to_surface(trial.touch, self._stiffness)
+                if back is not None and norm(back) <= norm(whole):
+                    trial = self.near(trial.state.q_springs + back, table)
+            if trial is not None and better(trial, share):
+                cut = self.spent > first + 2
+                self._damping = _LEAST_DAMPING + 4.0 * self._damping if cut else 0.25 * self._damping
+                self._damping *= self._damping >= _LEAST_DAMPING
+                return trial
+            if below:
+                break
+            share *= 0.5
+        return None
+
+
+def _back_to_surface(touch: Touch, stiffness: FloatArray) -> FloatArray | None:
+    """Shortest step that closes the gaps with a force and opens penetrations."""
+    return nearest_step(np.zeros(len(stiffness)), touch.gaps.values, touch.rows, stiffness, touch.forces > 0.0)
