@@ -67,6 +67,7 @@ from softrobots.statics.loads import EARTH_GRAVITY, distributed_force
 from softrobots.statics.sensitivity import compliance, elastostatic_jacobian
 from softrobots.statics.stability import Stability
 from softrobots.statics.time_law import Path3D, quintic, read_waypoints, straight_line, waypoints
+from softrobots.statics.tip_force.contact_place import locate_contact
 from softrobots.statics.trajectory import Trajectory, follow_trajectory
 from softrobots.statics.workspace import Workspace, sample_workspace
 from softrobots.version import __version__
@@ -160,6 +161,7 @@ __all__ = [
     "linearize",
     "load_model",
     "load_result",
+    "locate_contact",
     "measured_decay",
     "mount",
     "post_buckling_branches",
