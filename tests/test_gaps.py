@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
+from pathlib import Path
 
+import coal
 import numpy as np
 import pinocchio as pin
 import pytest
@@ -14,6 +17,7 @@ from scipy.spatial.transform import Rotation
 import softrobots as sr
 from softrobots.environment.capsules import robot_capsules
 from softrobots.environment.gaps import Gaps, Surroundings
+from softrobots.environment.obstacle_fields import obstacle_fields
 from softrobots.environment.obstacles import Obstacle
 from softrobots.model.joint_loads import Entries
 
@@ -102,7 +106,7 @@ def test_least_gap_of_each_capsule_is_the_distance_by_minimisation(arm: sr.SoftM
     """SciPy's minimisation along the core of a distance function of this test; its own tolerance: 1e-10 m."""
     distance, surroundings = distance_function(OBSTACLES[kind]), Surroundings(arm, sr.Environment([OBSTACLES[kind]]))
     inside = 0
-    for q in configurations(arm, 25 if kind != "mesh" else 5):
+    for q in configurations(arm, 10 if kind != "mesh" else 3):
         gaps = surroundings.at(q, 10.0)
         for number, (start, end, radius) in enumerate(cores_at(arm, q)):
             mine = np.flatnonzero(gaps.capsules == number)
@@ -131,8 +135,8 @@ def test_least_gap_of_each_capsule_is_the_distance_by_minimisation(arm: sr.SoftM
 @pytest.mark.parametrize("kind", OBSTACLES)
 def test_derivatives_of_gaps_are_slopes_of_gaps_and_of_gradients(arm: sr.SoftModel, kind: str) -> None:
     surroundings = Surroundings(arm, sr.Environment([OBSTACLES[kind]]))
-    compared = [compare_derivatives(surroundings, q, 10.0) for q in configurations(arm, 12)]
-    assert sum(map(bool, compared)) >= 6
+    compared = [compare_derivatives(surroundings, q, 10.0) for q in configurations(arm, 8)]
+    assert sum(map(bool, compared)) >= 4
     assert 2 in set().union(*compared) or kind == "half_space"
 
 
@@ -163,3 +167,182 @@ def test_neighbours_do_not_touch_each_other(arm: sr.SoftModel) -> None:
         gaps = surroundings.at(robot.configuration(robot.relaxed_motors), 10.0)
         assert gaps.values.min(initial=1.0) > 0.0
         assert np.all(gaps.capsules != gaps.obstacles)
+
+
+# --- Against Coal, and special places
+
+
+def coal_shape(obstacle: Obstacle) -> tuple[coal.CollisionGeometry, coal.Transform3s]:
+    transform = obstacle.transform_to_world
+    frame = coal.Transform3s(transform[:3, :3], transform[:3, 3])
+    if isinstance(obstacle, sr.HalfSpace):
+        return coal.Halfspace(np.array([0.0, 0.0, 1.0]), 0.0), frame
+    if isinstance(obstacle, sr.Sphere):
+        return coal.Sphere(obstacle.radius), frame
+    if isinstance(obstacle, sr.Box):
+        return coal.Box(*obstacle.size), frame
+    return (coal.Cylinder if isinstance(obstacle, sr.Cylinder) else coal.Capsule)(obstacle.radius, obstacle.length), frame
+
+
+@pytest.mark.parametrize("kind", ["half_space", "sphere", "box", "cylinder", "capsule"])
+def test_gaps_are_those_of_coal(kind: str) -> None:
+    """A section robot, whose capsules are short: Coal's distances at a tolerance of 1e-12, in metres 3e-11 for cylinders."""
+    robot = sr.load_model(sr.PccArm())
+    obstacle = OBSTACLES[kind].moved(pin.SE3(np.eye(3), np.array([-0.5, -0.1, 0.6])))
+    surroundings, (shape, frame) = Surroundings(robot, sr.Environment([obstacle])), coal_shape(obstacle)
+    request, compared = coal.DistanceRequest(), 0
+    request.gjk_tolerance = 1e-12
+    for q in configurations(robot, 6):
+        gaps = surroundings.at(0.5 * q, 10.0)
+        for number, (start, end, radius) in enumerate(cores_at(robot, 0.5 * q)):
+            along = (end - start) / np.linalg.norm(end - start)
+            across = np.cross(along, np.eye(3)[np.abs(along).argmin()])
+            across /= np.linalg.norm(across)
+            axes = coal.Transform3s(np.column_stack([across, np.cross(along, across), along]), 0.5 * (start + end))
+            result = coal.DistanceResult()
+            found = coal.distance(coal.Capsule(radius, np.linalg.norm(end - start)), axes, shape, frame, request, result)
+            ends = np.linalg.norm(gaps.core_points[:, None] - [start, end], axis=2).min(axis=1) < 1e-12
+            if found > 0.0:
+                assert gaps.values[(gaps.capsules == number) | ends].min() == pytest.approx(found, abs=3e-11)
+                compared += 1
+    assert compared > 20
+
+
+def one_link(length: float = 1.0) -> sr.SoftModel:
+    """One link of radius 0.05 m on two motors."""
+    return sr.load_model(sr.InflatableArm(link_lengths=(length,), radius=0.05, stiffness=100.0))
+
+
+def lying(obstacle: Obstacle, tilt: float = 0.0) -> Gaps:
+    """The arm straight along x, whose base is raised to `z = 0.05` above an obstacle's highest place at `z = 0`."""
+    robot = one_link()
+    return Surroundings(robot, sr.Environment([obstacle.moved(pin.SE3(np.eye(3), np.array([0.0, 0.0, -0.05])))])).at(
+        robot.configuration([0.0, tilt], [0.0, 0.0]), 0.01
+    )
+
+
+TURNED = Rotation.from_euler("x", 90, degrees=True).as_matrix()
+FLAT: dict[str, tuple[Obstacle, list[float]]] = {
+    "over both edges of a block": (sr.Box((0.2, 0.3, 0.2), (0.5, 0, -0.1)), [0.4, 0.6]),
+    "over one edge": (sr.Box((1.0, 0.3, 0.2), (1.1, 0, -0.1)), [0.6, 1.0]),
+    "on a mesh": (
+        sr.Mesh(np.array(list(itertools.product((0.4, 0.6), (-0.1, 0.2), (-0.2, 0.0))))),
+        [0.4, 0.6],
+    ),
+    "on the end of a cylinder": (sr.Cylinder(0.2, 0.3, (0.5, 0.0, -0.15)), [0.3, 0.7]),
+    "along a cylinder": (
+        sr.Cylinder(0.1, 0.3, (0.5, 0.0, -0.1), Rotation.from_euler("y", 90, degrees=True).as_matrix()),
+        [0.35, 0.65],
+    ),
+    "along a capsule": (
+        sr.Capsule(0.1, 0.3, (0.5, 0.0, -0.1), Rotation.from_euler("y", 90, degrees=True).as_matrix()),
+        [0.35, 0.65],
+    ),
+    "along an edge": (
+        sr.Box((0.3, 0.1, 0.1), (0.5, 0.0, -0.1 / np.sqrt(2.0)), Rotation.from_euler("x", 45, degrees=True).as_matrix()),
+        [0.35, 0.65],
+    ),
+    "across a cylinder": (sr.Cylinder(0.1, 0.3, (0.5, 0.0, -0.1), TURNED), [0.5]),
+    "on a ball": (sr.Sphere(0.1, (0.5, 0.0, -0.1)), [0.5]),
+}
+
+
+@pytest.mark.parametrize("case", FLAT)
+def test_a_link_that_lies_flat_rests_where_it_leaves_the_obstacle(case: str) -> None:
+    """By hand: contacts at these places along x. Tilted by 1e-7 rad either way, the outer places are the same to 1e-6 m."""
+    obstacle, places = FLAT[case]
+    for tilt in (0.0, 1e-7, -1e-7):
+        gaps = lying(obstacle, tilt)
+        touching = np.abs(gaps.values) < 2e-7
+        found = np.sort(gaps.points[touching & (gaps.points[:, 0] > 0.1), 0])
+        assert [found[0], found[-1]] == pytest.approx([places[0], places[-1]], abs=2e-6)
+        assert np.allclose(gaps.normals[touching], [0, 0, 1], atol=2e-6)
+        ways = np.abs(found[:, None] - found)[~np.eye(len(found), dtype=bool)]
+        assert ways.min(initial=1.0) > 1e-10  # no contact twice
+
+
+@pytest.mark.parametrize("kind", OBSTACLES)
+def test_a_core_within_an_obstacle_is_pushed_out(kind: str) -> None:
+    """Deeper is more negative; moving along the normal by the depth frees the point (of the core)."""
+    obstacle = OBSTACLES[kind]
+    ((field, _),) = obstacle_fields(sr.Environment([obstacle]))
+    centre = obstacle.transform_to_world[:3, 3]
+    points = (
+        centre
+        + np.random.default_rng(2).uniform(-0.05, 0.05, (50, 3))
+        - (0.1 * np.array([0, 0, 1]) if kind == "half_space" else 0.0)
+    )
+    which = np.zeros(len(points), dtype=int)
+    depths, normals = field.at(points, which)
+    assert np.isfinite(normals).all()
+    assert np.allclose(np.linalg.norm(normals, axis=1), 1.0)
+    inside = depths < 0.0
+    assert inside.sum() > 20
+    assert np.allclose(field.at((points - depths[:, None] * normals)[inside], which[inside])[0], 0.0, atol=1e-12)
+
+
+def test_gaps_follow_a_moving_obstacle_and_its_material(arm: sr.SoftModel) -> None:
+    """A turning and rising box: velocity of the gaps by differences; the slip of its surface by hand."""
+    environment = sr.Environment([sr.Box((0.3, 0.2, 0.15), POSITION, ROTATION, pose=rising)])
+    q, step = np.array([0.1, -0.2, 0.05, 0.1, 0.3, 0.0, -0.1]), 1e-5
+    before, gaps, after = (Surroundings(arm, environment.at(0.4 + x)).at(q, 10.0) for x in (-step, 0.0, step))
+    slopes = (after.values - before.values) / (2.0 * step)
+    assert gaps.keys == before.keys == after.keys
+    smooth = gaps.features <= 2
+    assert np.allclose(gaps.drift(environment.rates(0.4))[smooth], slopes[smooth], atol=1e-8)
+    there = Surroundings(arm, environment.at(0.7)).at(q + 0.1, 10.0)
+    on_robot, on_obstacle = there.places_of(gaps.material(np.arange(len(gaps))))
+    move = rising(0.7) * rising(0.4).inverse()
+    assert np.allclose(on_obstacle, [move.act(point) for point in gaps.obstacle_points], atol=1e-12)
+    data = arm.pinocchio.createData()
+    joints = [[one.joint for one in robot_capsules(arm) if one.joint > 0][number] for number in gaps.capsules]
+    local = []
+    pin.forwardKinematics(arm.pinocchio, data, q)
+    local = [data.oMi[joint].actInv(point) for joint, point in zip(joints, gaps.points, strict=True)]
+    pin.forwardKinematics(arm.pinocchio, data, q + 0.1)
+    assert np.allclose(on_robot, [data.oMi[joint].act(point) for joint, point in zip(joints, local, strict=True)], atol=1e-12)
+
+
+def rising(parameter: float) -> pin.SE3:
+    return pin.SE3(Rotation.from_rotvec([0.2 * parameter, 0.0, parameter]).as_matrix(), np.array([0.0, 0.1, 0.3 * parameter]))
+
+
+def test_forces_of_any_direction_on_the_surface_are_a_load(arm: sr.SoftModel) -> None:
+    """Torque and its derivative by Pinocchio's Jacobian of a frame at the material point, central differences."""
+    surroundings = Surroundings(arm, sr.Environment([OBSTACLES["box"]]))
+    q, nv = np.array([0.1, -0.2, 0.05, 0.1, 0.3, 0.0, -0.1]), 7
+    gaps = surroundings.at(q, 10.0)
+    forces = np.random.default_rng(4).normal(size=(len(gaps), 3))
+    points, joints = gaps.material(np.arange(len(gaps))).on_robot, gaps.capsules
+    moving = [one for one in robot_capsules(arm) if one.joint > 0]
+    model, frames = arm.pinocchio.copy(), []
+    for row, (point, number) in enumerate(zip(points, joints, strict=True)):
+        placement = pin.SE3(np.eye(3), point)
+        frames.append(model.addFrame(pin.Frame(f"touch_{row}", moving[number].joint, 0, placement, pin.FrameType.OP_FRAME)))
+    data = model.createData()
+
+    def torque(at: np.ndarray) -> np.ndarray:
+        axes = pin.ReferenceFrame.LOCAL_WORLD_ALIGNED
+        return sum(
+            pin.computeFrameJacobian(model, data, at, frame, axes)[:3].T @ f for frame, f in zip(frames, forces, strict=True)
+        )
+
+    load = gaps.load(forces)
+    assert np.allclose(load.torque, torque(q), atol=1e-12)
+    slopes = np.array([(torque(q + h) - torque(q - h)) / 2e-6 for h in 1e-6 * np.eye(nv)])
+    assert np.allclose(load.derivative(Entries.of(np.arange(nv), np.arange(nv), nv)), slopes, atol=1e-8)
+
+
+def test_a_robot_of_meshes_alone_says_what_it_needs(ur5: Path) -> None:
+    robot = sr.load_model(ur5, springs={}, tip="tool0")
+    with pytest.raises(sr.DescriptionError, match="softrobots:capsule"):
+        Surroundings(robot, sr.Environment([sr.Sphere(0.1)]))
+
+
+def test_an_environment_without_obstacles_has_no_gaps(arm: sr.SoftModel) -> None:
+    gaps = Surroundings(arm, sr.Environment()).at(np.zeros(7), 10.0)
+    assert len(gaps) == 0
+    assert gaps.keys == ()
+    assert gaps.jacobian.shape == (0, 7)
+    assert not gaps.load(np.zeros(0)).torque.any()
+    assert gaps.curvature(np.zeros(0))[0].shape == (0, 7)

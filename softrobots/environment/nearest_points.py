@@ -83,14 +83,14 @@ def core_points(
         bodies, begins, ways = which.take(rows), starts.take(rows, 0), spans.take(rows, 0)
         share, distance, normal, bend = _minimum(field, bodies, begins, ways, length.take(rows), *tables)
         round_here = bend * np.maximum(distance, 0.0)
+        way = share * length.take(rows)
+        unique = (way > merged) & (way < length.take(rows) - merged) & ((round_here > _PARALLEL) | (distance <= 0.0))
         for border in (place - 1, place) if len(used) else ():  # before and after the minimum
             at = np.minimum(np.maximum(border, 0), len(used) - 1)
             apart = np.abs(shares[rows, at + 1] - share) * length.take(rows)
-            stands = (apart <= merged) | ((apart <= 0.5 * distance) & (round_here > _ROUND))
+            stands = unique & ((apart <= merged) | ((apart <= 0.5 * distance) & (round_here > _ROUND)))
             keep[rows, at] &= ~stands
-        way, limit = share * length.take(rows), limits.take(rows)
-        unique = (way > merged) & (way < length.take(rows) - merged) & ((round_here > _PARALLEL) | (distance <= 0.0))
-        good = (unique & (distance <= limit)).nonzero()[0]
+        good = (unique & (distance <= limits.take(rows))).nonzero()[0]
         points_there = (begins + share[:, None] * ways).take(good, 0)
         zeros = np.zeros(len(good), dtype=np.intp)
         found = CorePoints(rows.take(good), zeros, points_there, distance.take(good), normal.take(good, 0))
