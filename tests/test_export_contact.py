@@ -158,6 +158,22 @@ def test_distances_to_obstacles_are_those_of_mujoco(tool: Tool, rng: np.random.G
     assert pairs > 20
 
 
+@pytest.mark.parametrize("itself", [False, True])
+def test_a_robot_touches_itself_where_it_is_folded_and_if_it_is_said(tool: Tool, itself: bool) -> None:
+    """Neighbours overlap and never touch; a chain that is bent by 0.28 rad a hinge is a ring whose ends overlap."""
+    mujoco = tool("mujoco")
+    arm = sr.load_model(sr.PccArm(segment_lengths=(1.2,), muscle_azimuths=(), chain="lumped", hinges=24))
+    far = Environment([HalfSpace((0, 0, 1), -9.0)], self_contact=itself)
+    model = mujoco.MjModel.from_xml_string(to_mjcf(arm, environment=far))
+    data = mujoco.MjData(model)
+    for bend, touches in ((0.0, False), (0.1, False), (0.28, True)):
+        data.qpos[:] = [bend if "bend_x" in name else 0.0 for name in arm.spring_joints]
+        mujoco.mj_forward(model, data)
+        assert (data.ncon > 0) == (touches and itself)
+    if itself:
+        assert {"segment_1_start", "section_1_1"} & {model.body(model.geom_bodyid[geom]).name for geom in data.contact[0].geom}
+
+
 def test_mujoco_presses_an_arm_on_a_wall_as_our_statics_does(tool: Tool) -> None:
     tool("mujoco")
     row = compare("arm on a wall", CASES["arm on a wall"](), "MuJoCo")

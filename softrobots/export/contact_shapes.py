@@ -6,8 +6,10 @@ exporter says how stiff. The collision shapes of the URDF are left out, because 
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any
 
 import numpy as np
@@ -17,9 +19,13 @@ from softrobots.core.checks import FloatArray, non_negative_number, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import Placement, RigidTree, Shape
 from softrobots.description.urdf_tags import CapsuleTag
+from softrobots.environment.capsules import capsule_tags
 from softrobots.environment.convex_mesh import Mesh
+from softrobots.environment.cores import cores_of
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacles import Box, HalfSpace, Obstacle
+from softrobots.environment.self_contact import self_contact_pairs
+from softrobots.model.soft_model import SoftModel
 
 _COLOUR = (0.72, 0.72, 0.68, 1.0)  # of obstacles
 
@@ -34,22 +40,23 @@ class ContactShapes:
     """Those whose shape is a "mesh", by name."""
     friction: float
     """Coefficient of friction."""
-    self_contact: bool
-    """Whether capsules of the robot collide with each other, neighbours excluded."""
+    apart: tuple[tuple[str, str], ...] | None
+    """Links of the robot that do not collide with each other, in pairs; None for all of them."""
 
     @property
     def remark(self) -> str:
         """What touches, for the head of the file."""
-        among = "and, but for neighbours, each other" if self.self_contact else "and not each other"
+        among = "and not each other" if self.apart is None else "and, but for neighbours, each other"
         slip = f"with the coefficient of friction {self.friction!r}" if self.friction else "without friction"
         return f"Capsules of the robot touch {', '.join(self.obstacles)} {among}, {slip}."
 
 
-def contact_shapes(environment: Any, friction: Any) -> ContactShapes | None:
+def contact_shapes(model: SoftModel, environment: Any, friction: Any) -> ContactShapes | None:
     """Return the obstacles of an environment as shapes; None for no environment.
 
     Raises:
         ParameterError: If it is no environment, an obstacle of it moves, or friction is negative, or given for no environment.
+        DescriptionError: If the robot has no capsules.
     """
     coefficient = non_negative_number("friction", friction, "-")
     if environment is None:
@@ -61,7 +68,7 @@ def contact_shapes(environment: Any, friction: Any) -> ContactShapes | None:
         obstacles={str(obstacle.name): _shape(obstacle) for obstacle in checked},
         meshes={str(obstacle.name): obstacle for obstacle in checked if isinstance(obstacle, Mesh)},
         friction=coefficient,
-        self_contact=checked.self_contact,
+        apart=_apart(model) if checked.self_contact else None,
     )
 
 
@@ -81,6 +88,15 @@ def with_capsules(tree: RigidTree, capsules: Sequence[CapsuleTag]) -> RigidTree:
     for capsule in capsules:
         shapes.setdefault(capsule.link, []).append(_capsule(capsule))
     return replace(tree, bodies=tuple(replace(body, collisions=tuple(shapes.get(body.name, ()))) for body in tree.bodies))
+
+
+def _apart(model: SoftModel) -> tuple[tuple[str, str], ...]:
+    """Links with capsules, in pairs, any of whose capsules may not touch each other (`self_contact_pairs`)."""
+    cores = cores_of(model)
+    links, capsules = [capsule.link for capsule in cores.capsules], Counter(tag.link for tag in capsule_tags(model))
+    touching = Counter(frozenset((links[one], links[other])) for one, other in self_contact_pairs(model, cores).tolist())
+    pairs = combinations(capsules, 2)
+    return tuple((one, other) for one, other in pairs if touching[frozenset((one, other))] < capsules[one] * capsules[other])
 
 
 def _capsule(tag: CapsuleTag) -> Shape:

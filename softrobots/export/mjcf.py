@@ -107,7 +107,7 @@ def to_mjcf(
         write_obstacles(world, assets, robot.contact)
     if not len(assets):
         root.remove(assets)
-    pairs = neighbours(robot.tree) if robot.contact is None or robot.contact.self_contact else ()
+    pairs = neighbours(robot.tree) if robot.contact is None else robot.contact.apart or ()
     if pairs:
         contact = ElementTree.SubElement(root, "contact")
         for first, second in pairs:

@@ -50,7 +50,7 @@ def write_contact_defaults(root: ElementTree.Element, option: ElementTree.Elemen
 
 def capsule_bits(contact: ContactShapes) -> dict[str, str]:
     """Return the attributes by which a capsule of the robot touches obstacles, and other capsules if they are to."""
-    among = _ROBOT if contact.self_contact else 0
+    among = 0 if contact.apart is None else _ROBOT
     return {"contype": str(among), "conaffinity": str(_OBSTACLES | among)}
 
 

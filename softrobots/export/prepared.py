@@ -83,7 +83,7 @@ def prepare(
     checked = check_linear(model)
     choice("actuators", actuators, ACTUATORS)
     rule = checked_damping(damping)
-    contact = contact_shapes(environment, friction)
+    contact = contact_shapes(checked, environment, friction)
     values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
     structure, tree = checked.structure, read_rigid_tree(checked.urdf)
     positions = dict(zip(structure.motor_joints, values.tolist(), strict=False))

@@ -210,7 +210,9 @@ class _Model:
         """Exclude collisions in Drake, of neighbours or, in surroundings, of all; a group ignores itself."""
         tree, contact = self._robot.tree, self._robot.contact
         groups: Sequence[tuple[str, ...]] = neighbours(tree)
-        if contact is not None and not contact.self_contact:
+        if contact is not None and contact.apart is not None:
+            groups = contact.apart
+        elif contact is not None:
             groups = [tuple(body.name for body in tree.bodies if body.collisions)]
         carriers = [tuple(dict.fromkeys(self._anchor.get(member, member) for member in group)) for group in groups]
         for number, members in enumerate(dict.fromkeys(carriers), 1):

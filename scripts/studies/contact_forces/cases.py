@@ -23,8 +23,11 @@ from softrobots.statics.loads import EARTH_GRAVITY
 
 MOTORS = (0.3, 0.6, -0.8)
 """Of the inflatable arm [rad]: its last link is 0.2 rad below the horizontal."""
+FOLDED = (0.3, 0.5, -2.9)
+"""Of the same arm: its last link lies below the first, along which a force on the tip presses it [rad]."""
 TENSIONS = (5.0,) * 6
 """Of the muscles of the lumped arm [N]: it stands straight up."""
+_UP = (0.0, 0.0, 30.0)
 _DOWN, _ASIDE, _ON_PEGS = (0.0, 0.0, -20.0), (0.0, 15.0, 0.0), (-6.0, 1.0, 0.0)
 _WALL = np.array([0.1, -1.0, 0.05]) / math.sqrt(1.0125)
 _ALONG_Y = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))  # turns z to y
@@ -105,6 +108,7 @@ CASES: Mapping[str, Callable[[], ContactCase]] = {
     "arm on the rim of a cylinder": lambda: _on(_DOWN, lambda at: Cylinder(0.05, 0.2, _under(at, 0.12))),
     "arm on a capsule": lambda: _on(_DOWN, lambda at: Capsule(0.05, 0.2, _under(at, 0.05), _ALONG_Y)),
     "arm on the corner of a mesh": lambda: _on(_DOWN, lambda at: Mesh(_PYRAMID, _under(at, 0.1))),
+    "arm folded on itself": lambda: ContactCase(arm(), FOLDED, _UP, Environment(self_contact=True)),
     "arm of muscles between pegs": _pegs,
 }
 """The cases by name."""

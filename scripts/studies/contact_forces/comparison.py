@@ -15,7 +15,7 @@ from softrobots.export.sdf import to_sdf
 from softrobots.statics.equilibrium_result import Equilibrium
 from studies.contact_forces.cases import ContactCase
 from studies.interop import drake_statics, mujoco_statics
-from studies.interop.outcomes import Outcome, Question
+from studies.interop.outcomes import ITSELF, Outcome, Question
 from studies.shared.markdown import line
 
 SIMULATORS = ("MuJoCo", "Drake")
@@ -37,7 +37,7 @@ class Row(NamedTuple):
     simulator: str
     """Name of the simulator."""
     forces: dict[str, list[float]]
-    """Our force of each obstacle that presses, by its name, world axes [N]."""
+    """Our force of what presses, as `Outcome.forces` has them [N]."""
     force_error: float
     """Largest difference of a force, relative to ours."""
     tip_error: float
@@ -52,11 +52,14 @@ class Row(NamedTuple):
 
 
 def forces_of(found: Equilibrium) -> dict[str, FloatArray]:
-    """Return the force of each obstacle that presses, world axes, shape (3,) [N]."""
+    """Return our forces of what presses, as `Outcome.forces` has them."""
     forces: dict[str, FloatArray] = {}
+    obstacles = found.environment.names if found.environment is not None else ()
     for contact in found.contacts:
+        name = contact.obstacle if contact.obstacle in obstacles else ITSELF
+        force = np.array([contact.normal_force]) if name == ITSELF else contact.force
         if contact.normal_force > 0.0:
-            forces[contact.obstacle] = forces.get(contact.obstacle, np.zeros(3)) + contact.force
+            forces[name] = forces.get(name, 0.0) + force
     return forces
 
 
@@ -93,14 +96,17 @@ def settled(case: ContactCase, simulator: str, seconds: float = SECONDS) -> Outc
 
 
 def compare(name: str, case: ContactCase, simulator: str) -> Row:
-    """Compare where a simulation settles with our equilibrium; raises as `settled` and `solve_equilibrium`."""
+    """Compare where a simulation settles with our equilibrium.
+
+    Raises:
+        ParameterError: If other obstacles press in the simulator.
+        SoftRobotsError: As `settled` and `solve_equilibrium`.
+    """
     ours, theirs = case.solve(), settled(case, simulator)
-    forces, nothing = forces_of(ours), np.zeros(3)
-    errors = [
-        float(np.linalg.norm(theirs.forces.get(obstacle, nothing) - forces.get(obstacle, nothing)) / np.linalg.norm(size))
-        for obstacle in forces.keys() | theirs.forces.keys()
-        for size in [forces.get(obstacle, np.full(3, np.finfo(float).tiny))]
-    ]
+    forces = forces_of(ours)
+    if forces.keys() != theirs.forces.keys():
+        raise ParameterError("case", name, f"pressed by {', '.join(forces)} in {simulator}, too ({', '.join(theirs.forces)})")
+    errors = [float(np.linalg.norm(theirs.forces[one] - force) / np.linalg.norm(force)) for one, force in forces.items()]
     tip = float(np.linalg.norm(case.tip(theirs.joints) - ours.tip_position)) / case.model.reach
     told = {obstacle: force.tolist() for obstacle, force in forces.items()}
     return Row(name, simulator, told, max(errors), tip, theirs.speed)

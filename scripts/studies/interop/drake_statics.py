@@ -12,7 +12,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NotConverged
 from softrobots.export.sdf_contact import SURROUNDINGS
 from studies.interop.newton import balance_point
-from studies.interop.outcomes import SECONDS, Outcome, Question
+from studies.interop.outcomes import ITSELF, SECONDS, Outcome, Question
 
 TIME_STEP = 1e-2
 """Time step of the discrete plant [s]; where it comes to rest does not depend on it."""
@@ -105,15 +105,21 @@ def simulate(question: Question, seconds: float = SECONDS) -> Outcome:
 
 
 def _obstacle_forces(plant: Any, results: Any) -> dict[str, FloatArray]:
-    """Sum of the forces of each link of a model that is not the robot's on the robot."""
+    """Forces of what touches the robot, see `Outcome.forces`; obstacles are links of a model of their own."""
     forces: dict[str, FloatArray] = {}
     for number in range(results.num_point_pair_contacts()):
         contact = results.point_pair_contact_info(number)
         bodies = [plant.get_body(index) for index in (contact.bodyA_index(), contact.bodyB_index())]
-        for body, sign in zip(bodies, (1.0, -1.0), strict=True):  # Drake's is that on B
-            if plant.GetModelInstanceName(body.model_instance()).endswith(SURROUNDINGS):
-                forces[body.name()] = forces.get(body.name(), np.zeros(3)) + sign * np.asarray(contact.contact_force())
+        names = [body.name() if _is_obstacle(plant, body) else "" for body in bodies]
+        on_second = np.asarray(contact.contact_force())
+        force = on_second if names[0] else -on_second if names[1] else np.array([np.linalg.norm(on_second)])
+        name = names[0] or names[1] or ITSELF
+        forces[name] = forces.get(name, 0.0) + force
     return forces
+
+
+def _is_obstacle(plant: Any, body: Any) -> bool:
+    return bool(plant.GetModelInstanceName(body.model_instance()).endswith(SURROUNDINGS))
 
 
 def _fill(plant: Any, question: Question) -> None:

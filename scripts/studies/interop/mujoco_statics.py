@@ -12,7 +12,7 @@ from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NotConverged, ParameterError
 from studies.interop.newton import balance_point
-from studies.interop.outcomes import SECONDS, Outcome, Question
+from studies.interop.outcomes import ITSELF, SECONDS, Outcome, Question
 
 REFRESH = 50
 """Steps after which the load is written anew (0.1 s at MuJoCo's default time step)."""
@@ -90,17 +90,16 @@ def simulate(question: Question, seconds: float = SECONDS) -> Outcome:
 
 
 def obstacle_forces(mujoco: Any, model: Any, data: Any) -> dict[str, FloatArray]:
-    """Return the force of each obstacle that touches on the robot, by the name of its geom, world axes, shape (3,) [N]."""
+    """Return the forces of what touches the robot, see `Outcome.forces`; obstacles are the geoms with names."""
     forces: dict[str, FloatArray] = {}
     pressed = np.zeros(6)
     for number in range(data.ncon):
         contact = data.contact[number]
         mujoco.mj_contactForce(model, data, number, pressed)
         on_second = contact.frame.reshape(3, 3).T @ pressed[:3]  # of the pair of geoms
-        for geom, sign in zip(contact.geom.tolist(), (1.0, -1.0), strict=True):
-            name = model.geom(geom).name
-            if name:  # only obstacles have one
-                forces[name] = forces.get(name, np.zeros(3)) + sign * on_second
+        first, second = (model.geom(geom).name for geom in contact.geom.tolist())
+        force = on_second if first else -on_second if second else pressed[:1]
+        forces[first or second or ITSELF] = forces.get(first or second or ITSELF, 0.0) + np.array(force)
     return forces
 
 

@@ -12,6 +12,9 @@ from studies.interop.cases import Gravity
 SECONDS = 60.0
 """Duration of a simulation [s]."""
 
+ITSELF = "itself"
+"""Name of the robot among what touches it."""
+
 
 class Question(NamedTuple):
     """A robot in a file, and its load."""
@@ -40,4 +43,5 @@ class Outcome(NamedTuple):
     wall_time: float
     """Time of the computation, without loading the file [s]."""
     forces: Mapping[str, FloatArray] = MappingProxyType({})
-    """Force of each obstacle that touches on the robot, by its name, world axes, shape (3,) [N]."""
+    """Force of each obstacle that touches on the robot, by its name, world axes, shape (3,) [N]; sum of the normal forces of
+    contacts of the robot with itself, by `ITSELF`, shape (1,) [N]."""
