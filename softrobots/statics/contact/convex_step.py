@@ -4,7 +4,7 @@ r"""Step of the search in contact: the quadratic programme of the energy over li
 
 with the Hessian of the Lagrangian :math:`H = K_t - \sum_i \lambda_i\, d^2 g_i/dy^2` (Nocedal and Wright, Numerical
 Optimization, 2006, equation 18.11), in coordinates in which the springs have stiffness 1. Its multipliers are the normal
-forces. daqp solves it (Arnstrom, Bemporad, Axehill: A dual active-set solver for embedded quadratic programming, 2022).
+forces.
 """
 
 from __future__ import annotations
@@ -14,13 +14,11 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.statics.contact.quadratic_programme import solve_programme
 from softrobots.statics.elastic_state import positive, scaled
 
 _LEAST = 1e-3  # least curvature along which a step is taken, relative to the springs
-_TIGHT = {"primal_tol": 1e-13, "dual_tol": 1e-13}
 _PRICE = 1e3  # of penetration in a step that cannot repair all of it, over usual energies in the box
-_FREE = 1e30  # bound that does not bind
-_SOLVED, _EQUALITY = 1, 5  # exit flag and kind of constraint of daqp
 
 
 class Step(NamedTuple):
@@ -67,11 +65,11 @@ def contact_step(
     if damping:
         relative = relative + damping * np.eye(len(soft))
     convex, shift, exact = _convex(relative, gaps, gradients, held, factors)
-    found = _solve(convex, pull + shift, gradients, -gaps)
+    found = solve_programme(convex, pull + shift, gradients, -gaps)
     if found is not None and shift.any():
         lost = 2.0 * float(found[1].sum()) * max(-float(gaps.min(initial=0.0)), 0.0)
         if not np.array_equal(found[1] > 0.0, held) or float(pull @ found[0]) > lost:  # other contacts are pressed, or uphill
-            exact, found = False, _solve(convex, pull, gradients, -gaps)
+            exact, found = False, solve_programme(convex, pull, gradients, -gaps)
     if found is None or np.linalg.norm(soft * found[0]) > longest:
         exact, found = False, _within(convex, pull, gradients, gaps, longest / soft)
     if found is None or not np.isfinite(found[0]).all():
@@ -87,7 +85,7 @@ def nearest_step(
     Those of `closed`, shape (m,), truth values, become zero; None if no step does that.
     """
     soft = 1.0 / np.sqrt(stiffness)
-    found = _solve(np.eye(len(soft)), -wanted / soft, rows * soft, -gaps, closed)
+    found = solve_programme(np.eye(len(soft)), -wanted / soft, rows * soft, -gaps, closed)
     return None if found is None else np.asarray(soft * found[0])
 
 
@@ -101,33 +99,6 @@ def repairing_step(gaps: FloatArray, rows: FloatArray, stiffness: FloatArray, lo
     return None if found is None else np.asarray(soft * found[0])
 
 
-def _solve(
-    hessian: FloatArray,
-    pull: FloatArray,
-    gradients: FloatArray,
-    bounds: FloatArray,
-    equal: Any = None,
-    box: FloatArray | None = None,
-) -> tuple[FloatArray, FloatArray] | None:
-    """Minimise `s^T H s / 2 + f^T s` with `A s >= b`, and `A s = b` in some rows, and `|s| <= box`.
-
-    Returns:
-        The solution, and the multipliers of the rows; None if there is none.
-    """
-    import daqp
-
-    m, limits = len(bounds), np.zeros(0) if box is None else box
-    if m + len(limits) == 0:
-        return np.asarray(np.linalg.solve(hessian, -pull)), np.zeros(0)
-    above, sense = np.concatenate([limits, np.full(m, _FREE)]), np.zeros(len(limits) + m, dtype=np.int32)
-    below = np.concatenate([-limits, bounds])
-    if equal is not None:
-        above[equal], sense[equal] = bounds[equal], _EQUALITY
-    matrices = (np.ascontiguousarray(one) for one in (hessian, pull, gradients))
-    solution, _, flag, info = daqp.solve(*matrices, above, below, sense, **_TIGHT)
-    return (np.array(solution), np.maximum(-np.array(info["lam"])[len(limits) :], 0.0)) if flag == _SOLVED else None
-
-
 def _within(
     hessian: FloatArray, pull: FloatArray, gradients: FloatArray, gaps: FloatArray, box: FloatArray
 ) -> tuple[FloatArray, FloatArray] | None:
@@ -135,14 +106,14 @@ def _within(
 
     Its price is far above any energy in the box.
     """
-    found = _solve(hessian, pull, gradients, -gaps, box=box)
+    found = solve_programme(hessian, pull, gradients, -gaps, box=box)
     if found is not None or not len(gaps) or gaps.min() >= 0.0:
         return found
     n, usual = len(pull), float(box @ box + abs(pull) @ box)
     wider = np.diag(np.full(n + 1, usual))
     wider[:n, :n] = hessian
     constraints = np.column_stack([gradients, np.full(len(gaps), -gaps.min())])
-    found = _solve(wider, np.append(pull, _PRICE * usual), constraints, -gaps, box=np.append(box, 1.0))
+    found = solve_programme(wider, np.append(pull, _PRICE * usual), constraints, -gaps, box=np.append(box, 1.0))
     return None if found is None else (found[0][:n], found[1])
 
 

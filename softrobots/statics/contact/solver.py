@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 from softrobots.core.checks import FloatArray
+from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.contact.descent import BALANCED, ContactSearch, Near
+from softrobots.statics.contact.touch import ForceTable, resting_forces
 from softrobots.statics.elastic_state import ElasticProblem, ElasticState
+from softrobots.statics.stability import is_stable
 
 _FIRST_GROWTH, _LEAST_GROWTH = 0.25, 1e-3  # parts of the load that are added at once
 
@@ -29,7 +32,22 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
     if found.error > BALANCED and not search.blocked(found):
         grown, stable = _grown(search, first)
         found = grown if grown is not None and grown.error < found.error else found
-    return found.state, search.spent, stable and found.error <= BALANCED
+    if found.error > BALANCED:
+        return found.state, search.spent, False
+    least = _of_least_norm(search, found)
+    if least is not None:
+        return least.state, search.spent, is_stable(problem.model, problem.load, least.state, problem.tolerance)
+    return found.state, search.spent, stable
+
+
+def _of_least_norm(search: ContactSearch, found: Near) -> Near | None:
+    """The equilibrium with the contact forces of least norm; None where the forces are unique."""
+    rows = found.touch.rows[found.touch.forces > 0.0]
+    if len(rows) == rows.shape[1] - null_space(rows).shape[1]:
+        return None
+    forces = resting_forces(found.touch, found.load, search.problem.model.reach)
+    least = search.near(found.state.q_springs, ForceTable(found.touch.gaps.keys, forces))
+    return least if least is not None and least.error <= max(BALANCED, found.error) else None
 
 
 def _grown(search: ContactSearch, here: Near) -> tuple[Near | None, bool]:

@@ -7,20 +7,25 @@ With gaps :math:`g_i(y)` and normal forces :math:`\lambda_i`, the contacts load 
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Sequence
 from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Gaps, Surroundings
 from softrobots.model.coordinates import Point
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.contact.quadratic_programme import solve_programme
 
 TOUCHING = 1e-9
 """Largest gap of surfaces that touch, and largest penetration of an equilibrium, relative to the reach."""
 
+_DEPENDENT = 1e-9  # least singular value of independent gradients over the largest
 _NEAR = 0.2  # gaps below this share of the reach are seen
 
 
@@ -90,12 +95,25 @@ NO_FORCES = ForceTable((), np.zeros(0))
 """No contact force yet."""
 
 
+class _Known(threading.local):
+    """The last environment of each robot that the calling thread has used."""
+
+    def __init__(self) -> None:
+        self.by_model: WeakKeyDictionary[SoftModel, tuple[Environment, Surroundings]] = WeakKeyDictionary()
+
+
+_KNOWN = _Known()
+
+
 class NearSurfaces:
     """The surfaces around one robot; belongs to the thread that created it."""
 
-    def __init__(self, model: SoftModel, environment: Any) -> None:
+    def __init__(self, model: SoftModel, environment: Environment) -> None:
         """Take the robot and its environment."""
-        self._surroundings, self._margin = Surroundings(model, environment), _NEAR * model.reach
+        known = _KNOWN.by_model.get(model)
+        if known is None or known[0] is not environment:
+            known = _KNOWN.by_model[model] = environment, Surroundings(model, environment)
+        self._surroundings, self._margin = known[1], _NEAR * model.reach
 
     def at(self, q: FloatArray, point: Point, forces: ForceTable) -> Touch:
         """Evaluate gaps and contact load at Pinocchio's configuration, shape (nq,), and the point of the coordinates there."""
@@ -107,6 +125,8 @@ class NearSurfaces:
 
 def joined(applied: JointLoad, contact: JointLoad) -> JointLoad:
     """Return a load with the load of contacts; contact forces have no potential."""
+    if not len(contact.angular):
+        return applied
     moments = applied.by_moment
     if moments is not None:
         moments = np.concatenate([moments, np.zeros_like(contact.angular)])
@@ -135,20 +155,25 @@ def resting_forces(touch: Touch, out_of_balance: FloatArray, reach: float) -> Fl
     if not len(near):
         return forces
     gradients = touch.rows[near].T
-    least = np.linalg.lstsq(gradients, out_of_balance, rcond=1e-10)[0]
-    if least.min() < 0.0:
-        least = _nonnegative(gradients, out_of_balance)
-    forces[near] = least
+    least = np.linalg.lstsq(gradients, out_of_balance, rcond=_DEPENDENT)[0]
+    forces[near] = least if least.min() >= 0.0 else _nonnegative(gradients, out_of_balance)
     return forces
 
 
 def _nonnegative(gradients: FloatArray, load: FloatArray) -> FloatArray:
-    """Least squares with coefficients zero or more (Lawson and Hanson, 1974)."""
+    """Least squares with coefficients zero or more (Lawson and Hanson, 1974), and of those the ones of least norm."""
     from scipy.optimize import nnls
 
     sizes = np.maximum(np.linalg.norm(gradients, axis=0), 1e-300)
-    forces: FloatArray = nnls(gradients / sizes, load, maxiter=100 * len(sizes))[0]
-    return np.asarray(forces / sizes)
+    best: FloatArray = np.asarray(nnls(gradients / sizes, load, maxiter=100 * len(sizes))[0]) / sizes
+    _, values, right = np.linalg.svd(gradients)
+    rank = int(np.sum(values > _DEPENDENT * values.max(initial=0.0)))
+    if rank == len(best):
+        return best
+    rows = np.concatenate([right[:rank], np.eye(len(best))])  # the same load, and no pull
+    bounds = np.concatenate([right[:rank] @ best, np.zeros(len(best))])
+    found = solve_programme(np.eye(len(best)), np.zeros(len(best)), rows, bounds, equal=np.arange(len(rows)) < rank)
+    return best if found is None else np.maximum(found[0], 0.0)
 
 
 def deepest_penetration(touch: Touch) -> str:

@@ -1,0 +1,44 @@
+"""Strictly convex quadratic programmes, by daqp.
+
+Arnstrom, Bemporad, Axehill: A dual active-set solver for embedded quadratic programming using recursive LDL^T updates, IEEE
+Trans. Automatic Control 67, 2022.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+
+_TIGHT = {"primal_tol": 1e-13, "dual_tol": 1e-13}
+_FREE = 1e30  # bound that does not bind
+_SOLVED, _EQUALITY = 1, 5  # exit flag and kind of constraint of daqp
+
+
+def solve_programme(
+    hessian: FloatArray,
+    pull: FloatArray,
+    gradients: FloatArray,
+    bounds: FloatArray,
+    equal: Any = None,
+    box: FloatArray | None = None,
+) -> tuple[FloatArray, FloatArray] | None:
+    """Minimise `s^T H s / 2 + f^T s` with `A s >= b`, and `A s = b` in some rows, and `|s| <= box`.
+
+    Returns:
+        The solution, and the multipliers of the rows; None if there is none.
+    """
+    import daqp
+
+    m, limits = len(bounds), np.zeros(0) if box is None else box
+    if m + len(limits) == 0:
+        return np.asarray(np.linalg.solve(hessian, -pull)), np.zeros(0)
+    above, sense = np.concatenate([limits, np.full(m, _FREE)]), np.zeros(len(limits) + m, dtype=np.int32)
+    below = np.concatenate([-limits, bounds])
+    if equal is not None:
+        above[equal], sense[equal] = bounds[equal], _EQUALITY
+    matrices = (np.ascontiguousarray(one) for one in (hessian, pull, gradients))
+    solution, _, flag, info = daqp.solve(*matrices, above, below, sense, **_TIGHT)
+    return (np.array(solution), np.maximum(-np.array(info["lam"])[len(limits) :], 0.0)) if flag == _SOLVED else None
