@@ -17,6 +17,7 @@ from scipy.spatial.transform import Rotation
 import softrobots as sr
 from softrobots.environment.capsules import robot_capsules
 from softrobots.environment.gaps import Gaps, Surroundings
+from softrobots.environment.nearest_points import core_points
 from softrobots.environment.obstacle_fields import obstacle_fields
 from softrobots.environment.obstacles import Obstacle
 from softrobots.model.joint_loads import Entries
@@ -346,3 +347,27 @@ def test_an_environment_without_obstacles_has_no_gaps(arm: sr.SoftModel) -> None
     assert gaps.jacobian.shape == (0, 7)
     assert not gaps.load(np.zeros(0)).torque.any()
     assert gaps.curvature(np.zeros(0))[0].shape == (0, 7)
+
+
+@pytest.mark.parametrize("kind", ["sphere", "box", "cylinder", "capsule"])
+def test_no_gap_between_the_ends_is_missed_at_special_places(kind: str) -> None:
+    """Cores on a coarse grid, so that they are parallel to faces and axes, tangent and through corners: 401 points of each."""
+    shape = {
+        "sphere": sr.Sphere(0.5),
+        "box": sr.Box((1, 0.5, 0.75)),
+        "cylinder": sr.Cylinder(0.5, 1),
+        "capsule": sr.Capsule(0.25, 1),
+    }[kind]
+    ((field, _),) = obstacle_fields(sr.Environment([shape]))
+    starts, ends = 0.25 * np.random.default_rng(8).integers(-4, 5, (2, 800, 3))
+    tangent = np.array([[0.5, -0.75, -0.5], [0.5, 0.75, -0.5]])
+    different = np.any(starts != ends, axis=1)
+    starts, ends = np.vstack([starts[different], tangent[0]]), np.vstack([ends[different], tangent[1]])
+    which = np.zeros(len(starts), dtype=int)
+    found = core_points(field, which, starts, ends - starts, np.full(len(starts), 9.0), 1e-9)
+    least = np.minimum(field.at(starts, which)[0], field.at(ends, which)[0])
+    np.minimum.at(least, found.pairs, found.distances)
+    shares = np.linspace(0.0, 1.0, 401)[:, None, None]
+    sampled = field.distance((starts + shares * (ends - starts)).reshape(-1, 3)).reshape(401, -1).min(axis=0)
+    assert (least - sampled).max() < 1e-12
+    assert (sampled - least).max() < 5e-3

@@ -13,7 +13,8 @@ _MAX_ITERATIONS = 60
 _SLOPE = 1e-13
 """Slope of the distance along the core at which the minimum is found; the distance is then exact to rounding."""
 _PARALLEL = 1e-12
-"""Curvature along the core, times distance, below which the nearest point is not unique: ends and borders hold the gap then."""
+"""Curvature along the core, times distance from the feature, below which the nearest point is not unique: ends and borders hold
+the gap then."""
 _ROUND = 0.1
 """The same, above which a minimum stands for a border of its feature that is nearer than half the distance."""
 
@@ -82,9 +83,9 @@ def core_points(
         tables = (column.ravel().take(entries) for column in (shares, slopes, distances))
         bodies, begins, ways = which.take(rows), starts.take(rows, 0), spans.take(rows, 0)
         share, distance, normal, bend = _minimum(field, bodies, begins, ways, length.take(rows), *tables)
-        round_here = bend * np.maximum(distance, 0.0)
+        round_here = bend * (np.maximum(distance, 0.0) + field.radii.take(bodies))
         way = share * length.take(rows)
-        unique = (way > merged) & (way < length.take(rows) - merged) & ((round_here > _PARALLEL) | (distance <= 0.0))
+        unique = (way > merged) & (way < length.take(rows) - merged) & ((round_here > _PARALLEL) | (distance <= merged))
         for border in (place - 1, place) if len(used) else ():  # before and after the minimum
             at = np.minimum(np.maximum(border, 0), len(used) - 1)
             apart = np.abs(shares[rows, at + 1] - share) * length.take(rows)
