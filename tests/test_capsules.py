@@ -328,3 +328,25 @@ def test_straight_links_are_exact_and_bad_coordinates_refused(arm: sr.SoftModel)
     bent = sr.load_model(sr.PccArm(elastic_sections=1, muscle_azimuths=()))
     with pytest.raises(sr.ParameterError, match="range of every section"):
         sr.capsule_error(bent, [], np.full(bent.n_springs, 3.0))
+
+
+@pytest.mark.parametrize("sections", [4, 20])
+@pytest.mark.parametrize("floor", [sr.HalfSpace((0, 0, 1)), sr.Box((4, 4, 1), (0, 0, -0.5))])
+def test_a_robot_stands_on_a_floor_without_touching_it(sections: int, floor: object) -> None:
+    """Its base has a flat end where the capsule has a cap; capsules of a radius 3 times as long as them, too."""
+    model = sr.load_model(sr.PccArm(elastic_sections=sections, muscle_azimuths=(), radius=0.05))
+    free = sr.solve_equilibrium(model, [], (2.0, 1.0, 0.0))
+    found = sr.solve_equilibrium(model, [], (2.0, 1.0, 0.0), environment=sr.Environment([floor]))
+    assert not found.contacts
+    np.testing.assert_allclose(found.q_springs, free.q_springs, atol=1e-9)
+
+
+def test_a_robot_that_is_pressed_to_its_floor_lies_on_it() -> None:
+    """Its tip is a radius above, and the floor carries part of the load; 1e-9 of the reach, the tolerance of gaps."""
+    model = sr.load_model(sr.PccArm(elastic_sections=8, muscle_azimuths=(), radius=0.05))
+    found = sr.solve_equilibrium(model, [], (3.0, 0.0, -28.0), environment=sr.Environment([sr.HalfSpace((0, 0, 1))]))
+    (contact,) = found.contacts
+    assert found.stable
+    assert contact.link == "section_2_8_upper"
+    assert 0.0 < contact.normal_force < 28.0
+    assert found.tip_position[2] == pytest.approx(0.05, abs=1e-9 * model.reach)

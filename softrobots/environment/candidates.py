@@ -57,7 +57,10 @@ def find_candidates(
     found: list[_Found] = []
     for field, numbers in fields:
         distances = field.distance(ends)
-        near, which = (distances <= end_limits).nonzero()
+        touching = distances <= end_limits
+        if len(cores.at_base):
+            touching[cores.at_base] &= ~_stands_on(field, cores, ends, distances)
+        near, which = touching.nonzero()
         of_ends = _ends(field, cores, ends, near, which, limits)
         if isinstance(field, HalfSpaces):
             found.append(of_ends.numbered(numbers))
@@ -94,6 +97,19 @@ class _Found(NamedTuple):
 
     def rows(self, chosen: Any) -> _Found:
         return _Found(self.field, *(column.take(chosen, 0) for column in self[1:]))
+
+
+def _stands_on(field: Field, cores: Cores, ends: FloatArray, distances: FloatArray) -> Any:
+    """Whether the end at the base that belongs to each of `at_base` is inside of each body, shape (k, n).
+
+    There the robot stands on the body, with a flat end: its capsules have caps, which are no contact.
+    """
+    radii = cores.radii[cores.end_capsules[cores.bases]]
+    inside = distances[cores.bases] < radii[:, None]
+    rows, which = inside.nonzero()
+    if len(rows):  # `distance` was a lower bound
+        inside[rows, which] = field.at(ends[cores.bases[rows]], which)[0] < radii[rows]
+    return inside
 
 
 def _ends(field: Field, cores: Cores, ends: FloatArray, near: Any, which: Any, limits: FloatArray) -> _Found:

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.environment.capsules import RobotCapsule, robot_capsules
+from softrobots.environment.distance_fields import skew
 from softrobots.model.soft_model import SoftModel, check_model
 
 SAME_POINT = 1e-9
@@ -47,12 +48,14 @@ class Cores:
         self._local = np.concatenate([ends, np.ones((self.count, 2, 1))], axis=2)
         self.moves = self._motion()
         """1 where a joint coordinate moves a capsule, else 0, shape (n, nv)."""
-        self.single_ends, numbers = self._single_ends(model)
+        self.single_ends, numbers, moving = self._single_ends(model)
         """The different ones of all ends (start and end of the first core, of the second, ...): neighbours share joints."""
         self.end_capsules, self.end_features = self.single_ends // 2, self.single_ends % 2
         """Capsule of each of them, and whether it is the start (0) or the end (1) of its core."""
         self.end_numbers = numbers.reshape(-1, 2)
         """Place of start and end of each core among the different ends, shape (n, 2)."""
+        self.at_base, self.bases = self._at_base(moving[self.single_ends])
+        """Different ends at the base, with an end within their radius that no joint moves, and that end, both of shape (k,)."""
 
     def at(self, q: FloatArray) -> CorePlaces:
         """Return the cores at Pinocchio's configuration, shape (nq,)."""
@@ -71,15 +74,21 @@ class Cores:
                 row[joints[number].idx_v : joints[number].idx_v + joints[number].nv] = 1.0
         return moves
 
-    def _single_ends(self, model: SoftModel) -> tuple[Any, Any]:
-        """Ends of equal radius that are one material point: at one place, and of one velocity, in two configurations."""
+    def _single_ends(self, model: SoftModel) -> tuple[Any, Any, Any]:
+        """Ends of equal radius that are one material point: at one place, and of one velocity, in two configurations.
+
+        Then the number of each end among them, and whether an end has a velocity in one of the configurations.
+        """
         random = np.random.default_rng(0)
         same: Any = True
+        moving = np.zeros(2 * self.count, dtype=bool)
         for _ in range(2):
             q = pin.integrate(self._model, pin.neutral(self._model), random.uniform(-0.5, 0.5, self._model.nv))
             places = self.at(q)
             points = places.ends.reshape(-1, 3)
             moves = np.repeat(self.moves, 2, axis=0)
+            speeds = (places.jacobian[:3] - skew(points) @ places.jacobian[3:]) * moves[:, None, :]
+            moving |= np.abs(speeds).max(axis=(1, 2), initial=0.0) > SAME_POINT * max(model.reach, 1.0)
             apart = np.linalg.norm(points[:, None] - points, axis=2)
             same = same & (apart <= SAME_POINT * model.reach)
             for i, j in np.argwhere(np.triu(same, 1)).tolist():
@@ -89,7 +98,16 @@ class Cores:
         radii = np.repeat(self.radii, 2)
         same = same & (radii[:, None] == radii)
         first = same.argmax(axis=1) if self.count else np.zeros(0, dtype=np.intp)
-        return np.unique(first, return_inverse=True)
+        return *np.unique(first, return_inverse=True), moving
+
+    def _at_base(self, moving: Any) -> tuple[Any, Any]:
+        points = self.at(pin.neutral(self._model)).ends.reshape(-1, 3)[self.single_ends]
+        still = np.flatnonzero(~moving)
+        if not len(still):
+            return still, still
+        apart = np.linalg.norm(points[:, None] - points[still], axis=2)
+        near = np.flatnonzero(apart.min(axis=1) <= self.radii[self.end_capsules])
+        return near, still[apart[near].argmin(axis=1)]
 
 
 class _KnownCores(threading.local):
