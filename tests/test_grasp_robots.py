@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.optimize import minimize
 
 import softrobots as sr
+from softrobots.environment.gaps import Surroundings
 from softrobots.statics.elastic_state import ElasticProblem
 from studies.contact.helix_grip import CYLINDER, HelixGrip
 
@@ -79,3 +81,63 @@ def test_a_helix_grips_the_cylinder_with_the_slope_of_its_energy_by_the_gap() ->
     assert {contact.obstacle for contact in found.contacts} == {"left", "right"}
     bounds = CYLINDER.force(10e3, CYLINDER.object_radius - grip.inner_radius)
     assert 5.0 < force < bounds.force < bounds.contact
+
+
+# --- Robots that touch themselves
+
+
+def test_turns_of_a_chain_are_as_far_apart_as_those_of_the_helix() -> None:
+    """Against `helix.self_contact`, of two turns at their local minimum: second order in the length of a section.
+
+    Both chords of a pair are nearer to the axis than the arcs, by their sagitta, and miss its direction of least distance.
+    """
+    angle, contraction = np.radians(5.0), 0.45
+    shape = sr.helix.forward(contraction, angle, 0.0331)
+    length = 4.0 * np.pi * np.hypot(shape.outer_radius, shape.pitch) * np.cos(angle)  # two turns
+    errors = []
+    for sections in (12, 24):
+        tube = sr.HelixTube(length=float(length), contraction=contraction, angle=angle, elastic_sections=sections)
+        model = sr.load_model(tube)
+        gaps = Surroundings(model, sr.Environment([], self_contact=True)).at(model.configuration([], model.rest), 0.1)
+        errors.append(float(gaps.values.min() - tube.contact.turn_clearance))
+    sagitta = (1.0 - np.cos(0.5 * tube.strains[1] * tube.centre_length / sections)) / tube.strains[1]
+    assert abs(errors[1]) < sagitta
+    assert 3.0 < errors[0] / errors[1] < 6.0
+
+
+def test_a_folded_arm_rests_with_its_tip_on_its_base() -> None:
+    """Three links in a plane, folded until the last end is within both radii of the base: the least energy of three springs
+    whose chain keeps the distance, by SciPy (its tolerance, 1e-9), and the force along the line between them."""
+    robot = sr.InflatableArm(link_lengths=(0.6, 0.6, 0.6), stiffness=150.0)
+    found = sr.solve_equilibrium(
+        sr.load_model(robot), (0.0, 0.5, -2.0, -2.0), environment=sr.Environment([], self_contact=True)
+    )
+
+    def end(bends: np.ndarray) -> np.ndarray:
+        angles = np.array([0.0, bends[0], bends[0] - 2.0, bends[0] + bends[1] - 2.0, bends[:2].sum() - 4.0, bends.sum() - 4.0])
+        pieces = np.tile([0.03, 0.57], 3)
+        return np.array([pieces @ np.cos(angles), pieces @ np.sin(angles)])
+
+    reach = {"type": "ineq", "fun": lambda bends: np.linalg.norm(end(bends)) - 0.11}
+    best = minimize(lambda bends: 75.0 * bends @ bends, np.zeros(3), constraints=[reach], options={"ftol": 1e-16})
+    (contact,) = found.contacts
+    assert (contact.link, contact.obstacle) == ("link_3", "link_1_root")
+    bends = found.q_springs.reshape(3, 2)  # sideways and up, of each link
+    assert np.abs(bends).max(axis=0) == pytest.approx(np.abs(best.x).max() * np.array([0.0, 1.0]), abs=1e-8)
+    assert sorted(np.abs(bends[:, 1])) == pytest.approx(sorted(np.abs(best.x)), abs=1e-8)
+    slope = np.array([(reach["fun"](best.x + step) - reach["fun"](best.x - step)) / 2e-6 for step in 1e-6 * np.eye(3)])
+    assert contact.normal_force == pytest.approx(150.0 * (best.x @ slope) / (slope @ slope), rel=1e-6)
+    assert abs(contact.gap) < 1e-12
+    assert found.stable
+
+
+def test_a_fold_through_the_arm_itself_is_left_or_named() -> None:
+    """Cores that cross have no normal and no second derivative; the solver passes through, and ends outside or says where."""
+    model, environment = sr.load_model(sr.InflatableArm(link_lengths=(0.6, 0.6, 0.6))), sr.Environment([], self_contact=True)
+    for bend in (2.1, 2.2):
+        try:
+            found = sr.solve_equilibrium(model, (0.0, 0.5, -bend, -bend), environment=environment)
+        except sr.EquilibriumNotFound as error:
+            assert "inside of 'link_1'" in str(error)
+        else:
+            assert all(abs(contact.gap) < 1e-9 for contact in found.contacts)

@@ -21,6 +21,7 @@ from softrobots.environment.nearest_points import core_points
 from softrobots.model.soft_model import SoftModel
 
 _SINGULAR = 1e-12
+_CROSSING = 1e-9  # least distance of two cores [m]: where they cross, deep inside of each other, it has no second derivative
 
 
 def own_capsules(cores: Cores, places: CorePlaces) -> RoundedBoxes:
@@ -109,6 +110,7 @@ def relative_curvature(
         Rows, shape (nv,) each, and their weights [1/m].
     """
     one, two = pair
+    distance = max(distance, _CROSSING)
     other = point - distance * normal
     first = np.eye(3)[int(np.abs(normal).argmin())]
     first = first - (first @ normal) * normal
