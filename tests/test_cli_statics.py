@@ -337,6 +337,81 @@ def test_a_pull_has_no_branches(told) -> None:
     assert (status, out) == (1, "no branches: the equilibrium stays stable up to 50 N along [1.0, 0.0, 0.0]\n")
 
 
+# --- Obstacles
+
+ROOM = """\
+obstacles:
+  - {kind: half_space, name: wall, normal: [-1, 0.2, -0.1], offset: -1.0}
+  - {kind: box, name: shelf, size: [0.2, 0.2, 0.2], position: [0.63, 0.235, -0.03]}
+"""
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> str:
+    """File of obstacles that the arm leans on."""
+    (tmp_path / "room.yaml").write_text(ROOM, encoding="utf-8")
+    return str(tmp_path / "room.yaml")
+
+
+LEANING = ("inflatable_arm", "--gravity", "--force", "5", "0", "-20")
+
+
+def test_solve_lists_the_contacts(room: str, answer, told: Told, arm: sr.SoftModel) -> None:
+    """The same contacts as from Python, as a table and as data."""
+    words = ("solve", *LEANING, "--motors", "0.3", "0.4", "-0.3", "--environment", room)
+    found, around = answer(*words), sr.Environment.from_file(room)
+    held = sr.solve_equilibrium(arm, (0.3, 0.4, -0.3), (5, 0, -20), gravity=sr.EARTH_GRAVITY, environment=around)
+    same(found, held)
+    assert len(held.contacts) == 2
+    for row, contact in zip(found["contacts"], held.contacts, strict=True):
+        assert (row["link"], row["obstacle"], row["status"]) == (contact.link, contact.obstacle, "pressed")
+        assert (row["normal_force"], row["gap"]) == (contact.normal_force, contact.gap)
+        assert row["force"] == contact.force.tolist()
+        assert row["point"] == contact.point.tolist()
+    assert found["load"]["environment"] == around.to_dict()
+    _, out, _ = told(*words)
+    assert re.search(r"^obstacles +wall, shelf$", out, re.M)
+    assert re.search(rf"^link_2 +wall +pressed +{held.contacts[0].normal_force:.6f}  N ", out, re.M)
+    away = told("solve", "inflatable_arm", "--motors", "0", "1.2", "0", "--environment", room)[1]
+    assert re.search(r"^contacts +none: the robot touches nothing$", away, re.M)
+
+
+def test_other_commands_lean_on_obstacles(room: str, answer, told: Told, arm: sr.SoftModel, tmp_path: Path) -> None:
+    """Motors, modes, forces and paths among the same obstacles as from Python."""
+    options = {"gravity": sr.EARTH_GRAVITY, "environment": sr.Environment.from_file(room)}
+    held = sr.solve_equilibrium(arm, (0.3, 0.4, -0.3), (5, 0, -20), **options)
+    motors = ("--motors", "0.3", "0.4", "-0.3")
+    modes = answer("modes", *LEANING, *motors, "--environment", room)
+    assert np.allclose(modes["frequencies"], sr.vibration_modes(arm, held).frequencies, rtol=1e-12)
+    target = tuple(map(repr, held.tip_position.tolist()))
+    found = answer("ik", *LEANING, "--target", *target, "--start", "0.3", "0.4", "-0.3", "--environment", room)
+    assert found["error"] < 1e-9
+    assert [row["obstacle"] for row in found["equilibrium"]["contacts"]] == ["wall", "shelf"]
+    torques = tuple(map(repr, held.motor_torques.tolist()))
+    felt = answer("load", "inflatable_arm", "--gravity", *motors, "--torques", *torques, "--environment", room)
+    assert len(felt["equilibrium"]["contacts"]) == 2
+    path = tmp_path / "path.csv"
+    rows = held.tip_position + np.linspace(0.0, 0.05, 3)[:, None] * (-1.0, 0.2, -0.1)
+    path.write_text("x,y,z\n" + "".join(",".join(map(repr, row)) + "\n" for row in rows.tolist()), encoding="utf-8")
+    words = ("ik", *LEANING, "--waypoints", str(path), "--start", "0.3", "0.4", "-0.3", "--environment", room)
+    forces = answer(*words)["contact_forces"]
+    assert forces["wall"][0] == pytest.approx(held.contacts[0].normal_force, rel=1e-6)
+    assert forces["wall"][1:] == [0.0, 0.0]
+    table = tmp_path / "followed.csv"
+    out = told(*words, "-o", str(table))[1]
+    assert re.search(r"^force on wall +up to \S+ N, at waypoint 1$", out, re.M)
+    assert "force on wall [N]" in table.read_text(encoding="utf-8").splitlines()[0]
+
+
+def test_a_file_of_obstacles_that_is_none_is_told(told: Told, tmp_path: Path) -> None:
+    file = tmp_path / "room.yaml"
+    file.write_text("obstacles: [{kind: teapot}]\n", encoding="utf-8")
+    status, _, error = told("solve", "inflatable_arm", "--environment", str(file))
+    assert (status, "teapot" in error) == (2, True)
+    status, _, error = told("solve", "inflatable_arm", "--environment", str(tmp_path / "nowhere.yaml"))
+    assert (status, "nowhere.yaml" in error) == (2, True)
+
+
 # --- softrobots load
 
 

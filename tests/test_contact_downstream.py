@@ -12,6 +12,7 @@ import pytest
 from hypothesis import given, settings
 
 import softrobots as sr
+from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Surroundings
 from softrobots.environment.obstacles import Box, HalfSpace, Sphere
@@ -312,6 +313,21 @@ def test_a_file_with_a_robot_inside_of_an_obstacle_is_refused(tmp_path: Path) ->
     assert deeper != text
     file.write_text(deeper, encoding="utf-8")
     with pytest.raises(sr.FileFormatError, match=r"inside of an obstacle|claims a residual"):
+        sr.load_result(file)
+
+
+def test_a_result_names_no_other_file(tmp_path: Path) -> None:
+    """Corners of a mesh are in the file of a result; a path in their place is not opened."""
+    arm, corners = sr.load_model(sr.InflatableArm()), np.array(list(np.ndindex(2, 2, 2))) * 0.2 + (0.53, 0.13, -0.13)
+    held = sr.solve_equilibrium(arm, MOTORS, FORCE, gravity=sr.EARTH_GRAVITY, environment=Environment([Mesh(corners), WALL]))
+    file = sr.save_result(held, tmp_path / "leaning.json")
+    again = sr.load_result(file)
+    assert [one.obstacle for one in again.contacts] == [one.obstacle for one in held.contacts]
+    text = file.read_text(encoding="utf-8")
+    start = text.index('\\"vertices\\": ') + len('\\"vertices\\": ')
+    elsewhere = text[:start] + '\\"/etc/hosts\\"' + text[text.index("]]", start) + 2 :]
+    file.write_text(elsewhere, encoding="utf-8")
+    with pytest.raises(sr.FileFormatError, match="another file"):
         sr.load_result(file)
 
 

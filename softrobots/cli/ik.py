@@ -9,7 +9,7 @@ from typing import Any
 import pinocchio as pin
 
 from softrobots.cli.options.command_line import add_numbers
-from softrobots.cli.options.load_argument import add_loads, loads_of
+from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
@@ -30,6 +30,7 @@ _EXAMPLES = """examples:
   softrobots ik pcc_arm --target 0.3 -0.2 0.9 --orientation 0.5 0 1 --gravity
   softrobots ik inflatable_arm --set wrist=[0.08,0.12] --target 0.9 0.3 0.1 --rpy 0 1.57 0 --force 0 10 -15
   softrobots ik inflatable_arm --target 0.9 0.3 0.2 --gravity --json
+  softrobots ik inflatable_arm --target 0.9 0.3 0.2 --gravity --environment room.yaml
 """
 
 _STARTS = 24
@@ -59,6 +60,7 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(how, "--orientation", "X Y Z", help_text)
     add_numbers(how, "--rpy", "R P Y", "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)")
     add_loads(parser)
+    add_environment(parser)
     help_text = "where the search starts: motor joints, then muscles, base to tip [rad, m, N or Pa] (relaxed)"
     add_numbers(parser, "--start", "Q", help_text, nargs="+")
     help_text = (

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
+from softrobots.cli.options.load_argument import add_environment, environment_of
 from softrobots.cli.options.output_files import add_output, check_output, save
 from softrobots.cli.options.robot_argument import (
     add_model,
@@ -63,6 +64,7 @@ def add_parser(subparsers: Any) -> None:
     help_text = "direction that the force has, as at a contact without friction, world axes, of any length [-] (any)"
     add_numbers(parser, "--direction", "X Y Z", help_text)
     add_gravity(parser)
+    add_environment(parser)
     parser.add_argument(
         "--method", choices=METHODS, default="newton", help="the solver; alternation is the paper's (%(default)s)"
     )
@@ -100,6 +102,7 @@ def run(arguments: argparse.Namespace) -> None:
         frame=frame,
         directions=arguments.direction,
         gravity=gravity_of(arguments),
+        environment=environment_of(arguments),
         restart=not arguments.no_restart,
         **deviations,
         max_iterations=arguments.max_iterations,

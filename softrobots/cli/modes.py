@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.cli.options.command_line import add_damping, add_numbers
-from softrobots.cli.options.load_argument import add_loads, loads_of
+from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import (
     add_output,
     add_plot,
@@ -49,6 +49,7 @@ def add_parser(subparsers: Any) -> None:
     add_model(parser)
     add_motors(parser)
     add_loads(parser)
+    add_environment(parser)
     add_damping(parser)
     help_text = "stiffness with which motors hold their place, one for all or one for each [N m/rad or N/m] (they are held)"
     add_numbers(parser, "--servo-stiffness", "K", help_text, nargs="+")

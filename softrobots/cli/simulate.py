@@ -34,7 +34,7 @@ from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad, curve
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
-from softrobots.statics.loads import Load, check_no_contact
+from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
 from softrobots.view.figures import motions
 from softrobots.view.viewer import Viewer
@@ -103,7 +103,6 @@ def run(arguments: argparse.Namespace) -> None:
     _check_files(arguments)
     model = statics_model_of(arguments)
     load = Load.of(model, **loads_of(arguments, model))
-    check_no_contact(load, "a simulation (export the robot with its obstacles to MuJoCo or Drake)")
     motors, duration = _motors(arguments, model)
     table = arguments.force_table
     gust = None if table is None else _columns(read_table(table, ("t", "fx", "fy", "fz")))

@@ -6,7 +6,7 @@ import argparse
 from typing import Any
 
 from softrobots.cli.options.command_line import add_numbers
-from softrobots.cli.options.load_argument import add_loads, loads_of
+from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, aligned, formatted, print_answer
@@ -27,6 +27,7 @@ _EXAMPLES = """examples:
   softrobots solve inflatable_arm --critical-load -1 0 0          the force at which the straight arm buckles
   softrobots solve inflatable_arm --force 0 10 -15 --wrench link_1 0 0 -5 0 0 0 -o sagging.npz
   softrobots solve pcc_arm --motors 0.50 0.53 0.55 0.54 0.51 0.52 --gravity --plot shape.png
+  softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --gravity --environment room.yaml
   softrobots solve my_arm.urdf --spring wrist=40 --spring elbow=25,0.1 --tip tool --gravity
 """
 
@@ -44,6 +45,7 @@ def add_parser(subparsers: Any) -> None:
     add_model(parser)
     add_motors(parser)
     add_loads(parser)
+    add_environment(parser)
     parser.add_argument(
         "--method", choices=METHODS, default="newton", help="the solver; fixed_point is the paper's (%(default)s)"
     )

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from softrobots.cli.options.command_line import add_numbers, address_lines
-from softrobots.cli.options.load_argument import add_loads, loads_of
+from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import check_ending
 from softrobots.cli.options.robot_argument import add_model, add_motors, model_of, motors_of, source_of
 from softrobots.cli.reports.answers import add_json, print_answer
@@ -78,6 +78,7 @@ def add_parser(subparsers: Any) -> None:
     help_text = "motor joints, then muscles, base to tip [rad, m, N or Pa]; with --target, where the search starts (relaxed)"
     add_motors(parser, help_text)
     add_loads(parser)
+    add_environment(parser)
     add_numbers(parser, "--target", "X Y Z", "move the loaded tip to this position by inverse kinematics [m] (no target)")
     help_text = (
         "show a saved result, e.g. of `softrobots solve -o`, `ik -o`, `modes -o` or `simulate -o`, in place of ROBOT (none)"

@@ -64,7 +64,11 @@ def unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
     springs = {str(name): (float(k), float(rest)) for name, (k, rest) in arguments["springs"].items()}
     muscles = arguments.get("muscles", "lengths")
     model = load_again(urdf, springs=springs, motors=arguments["motors"], tip=arguments["tip"], muscles=muscles)
-    environment = Environment.from_dict(load["environment"]) if "environment" in load else None
+    environment = None
+    if "environment" in load:
+        if any(isinstance(one.get("vertices"), str) for one in load["environment"]["obstacles"]):
+            raise FileFormatError("an obstacle of it is another file")
+        environment = Environment.from_dict(load["environment"])
     return model, Load.of(model, wrench=load["wrenches"], gravity=load["gravity"], environment=environment)
 
 

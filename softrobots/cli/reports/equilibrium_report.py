@@ -145,7 +145,8 @@ def head_lines(model: SoftModel, load: Load) -> list[str]:
     gravity = "none" if load.gravity is None else f"{formatted(np.array(load.gravity))} m/s^2"
     hinges = max((group.n_hinges for group in model.spring_groups), default=1)
     robot = ("robot", f"{model.pinocchio.name}{f', {hinges} hinges a link' if hinges > 1 else ''} (tip: {model.tip})")
-    return aligned([robot, *springs, *(rows or [("load", "none")]), ("gravity", gravity)])
+    around = [] if load.environment is None else [("obstacles", ", ".join(load.environment.names) or "the robot itself")]
+    return aligned([robot, *springs, *(rows or [("load", "none")]), ("gravity", gravity), *around])
 
 
 def joined_units(units: Sequence[str]) -> str:
