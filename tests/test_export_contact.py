@@ -20,11 +20,12 @@ from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Surroundings
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
-from softrobots.export import export_model, to_json, to_mjcf, to_sdf
+from softrobots.export import export_model, to_json, to_mjcf, to_pybullet, to_sdf
 from studies.contact_forces.cases import CASES
-from studies.contact_forces.comparison import compare
-from studies.interop import drake_statics, mujoco_statics
+from studies.contact_forces.comparison import compare, forces_of
+from studies.interop import bullet_statics, drake_statics, mujoco_statics
 from studies.interop.outcomes import Question
+from tests.conftest import skip_without_bullet_wheels
 from tests.support.foreign import INERTIAL, joint
 
 Tool = Callable[[str], ModuleType]
@@ -182,6 +183,26 @@ def test_mujoco_presses_an_arm_on_a_wall_as_our_statics_does(tool: Tool) -> None
 
 
 @pytest.mark.study
+def test_pybullet_presses_an_arm_on_obstacles_nearly_as_our_statics_does(tool: Tool) -> None:
+    """1 %: it rounds the corners of boxes and meshes, and ends where motion is small."""
+    skip_without_bullet_wheels()
+    tool("pybullet")
+    for name in [one for one in CASES if one.startswith("arm on")]:
+        case = CASES[name]()
+        text = to_pybullet(
+            case.model,
+            case.q_motors,
+            actuators="welded",
+            damping="critical",
+            environment=case.environment,
+            gravity=case.gravity,
+        )
+        found = bullet_statics.simulate(Question(text, case.model.tip, case.force, case.gravity))
+        for obstacle, force in forces_of(case.solve()).items():
+            assert np.linalg.norm(found.forces[obstacle] - force) < 1e-2 * np.linalg.norm(force), name
+
+
+@pytest.mark.study
 @pytest.mark.parametrize(("simulator", "module"), [("MuJoCo", "mujoco"), ("Drake", "pydrake")])
 def test_simulators_press_robots_on_obstacles_as_our_statics_does(tool: Tool, simulator: str, module: str) -> None:
     """Forces within 1e-3, tips within 1e-5 of the reach, at rest."""
@@ -206,7 +227,7 @@ def test_simulators_press_robots_on_obstacles_as_our_statics_does(tool: Tool, si
 )
 def test_surroundings_that_no_file_holds_are_refused(told: str, options: dict[str, Any]) -> None:
     arm = sr.load_model(sr.InflatableArm())
-    for write in (to_mjcf, to_sdf):
+    for write in (to_mjcf, to_sdf, to_pybullet):
         with pytest.raises(sr.ParameterError, match=told):
             write(arm, **options)
     if "friction" not in options:
@@ -214,11 +235,13 @@ def test_surroundings_that_no_file_holds_are_refused(told: str, options: dict[st
             to_json(arm, **options)
 
 
-def test_robots_without_capsules_and_names_that_sdf_reserves_are_refused() -> None:
+def test_what_a_file_cannot_hold_is_refused() -> None:
     bare = sr.load_model(LEVERS.replace("softrobots:capsule", "other"), springs={"turn_1": 1.0, "turn_2": 1.0})
     for write in (to_mjcf, to_sdf):
         with pytest.raises(sr.DescriptionError, match="no capsules"):
             write(bare, environment=Environment([Sphere(1.0)]))
+    with pytest.raises(sr.ParameterError, match="without self_contact"):
+        to_pybullet(levers(), environment=Environment([Sphere(1.0)], self_contact=True))
     with pytest.raises(sr.DescriptionError, match="obstacles named world"):
         to_sdf(levers(), environment=Environment([Sphere(1.0, name="world")]))
 
@@ -244,5 +267,5 @@ def test_the_sidecar_holds_the_obstacles(tmp_path: Path) -> None:
     file = export_model(arm, tmp_path / "arm.json", environment=environment)
     assert Environment.from_dict(json.loads(file.read_text())["environment"]) == environment
     assert "environment" not in json.loads(to_json(arm))
-    with pytest.raises(sr.ParameterError, match="formats that have it: mjcf, sdf, json"):
+    with pytest.raises(sr.ParameterError, match="formats that have it: mjcf, sdf, pybullet, json"):
         export_model(arm, tmp_path / "arm.py", "pinocchio", environment=environment)

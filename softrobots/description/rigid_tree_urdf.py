@@ -180,7 +180,7 @@ def _write_shape(element: Element, shape: Shape) -> None:
     elif shape.kind == "box":
         solid.set("size", number_text(shape.size))
     else:
-        for name, value in zip(SOLIDS[shape.kind], shape.size, strict=True):
+        for name, value in zip(("radius", "length"), shape.size, strict=False):  # also of capsules, for PyBullet
             solid.set(name, repr(float(value)))
     if shape.rgba is not None:
         name = "colour_" + "_".join(f"{value:.6g}" for value in shape.rgba)

@@ -19,6 +19,8 @@ from softrobots.description.mesh_files import remove_mesh_shapes
 from softrobots.description.rigid_tree import Body, RigidTree, Shape
 from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_tree
 from softrobots.description.urdf_tags import NAMESPACE
+from softrobots.environment.environment import Environment
+from softrobots.export.contact_shapes import ContactShapes
 from softrobots.export.damping import lowest_frequency, mass_matrix
 from softrobots.export.held import HeldRobot, hold
 from softrobots.export.prepared import checked_gravity, prepare, tip_body
@@ -44,12 +46,17 @@ def to_pybullet(
     damping: str | float = "file",
     gravity: Any = None,
     limits: bool = True,
+    environment: Environment | None = None,
+    friction: float = 0.0,
 ) -> str:
     """Write a robot as a self-contained Python file for PyBullet: URDF, springs and the code that applies them.
 
     The file has `load(client)`, `drive(robot, positions)`, `apply_springs(robot)`, `step(robot, force, link)` and
     `settle(robot, force, link)`. Springs are torques by a linearly implicit rule, which is stable at PyBullet's 240 Hz for
     light links, too: the docstring of the file has the equations and the limits. Meshes are left out.
+
+    In an environment, `load` makes a body of each obstacle (`robot.obstacles`), which touches the capsules of the robot; they
+    stand in its URDF in place of the other collision shapes.
 
     Args:
         model: The robot.
@@ -60,18 +67,25 @@ def to_pybullet(
             without swinging (`softrobots.export.damping`).
         gravity: Gravity, shape (3,) [m/s^2], world axes, used when the file is run as a script; None: weightless.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
+        environment: Obstacles around the robot, which stand still; without contact of the robot with itself.
+        friction: Coefficient of friction between the robot and them.
 
     Returns:
         Text of the file.
 
     Raises:
         ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, springs that are
-            not linear, actuators that are no joint springs when they are held, or more joints than PyBullet supports.
+            not linear, actuators that are no joint springs when they are held, or more joints than PyBullet supports; if
+            obstacles move, or the robot is to touch itself.
         DescriptionError: If a moving link has no mass.
     """
     held = _held(model, q_motors)
     field = checked_gravity(gravity)
-    robot = prepare(model, q_motors, actuators=actuators, damping=damping)
+    robot = prepare(model, q_motors, actuators=actuators, damping=damping, environment=environment, friction=friction)
+    if robot.contact is not None and robot.contact.apart is not None:
+        raise ParameterError(
+            "environment", environment, "one without self_contact: PyBullet's links do not touch each other here"
+        )
     joints = {joint.name: joint for joint in robot.tree.joints}
     if len(joints) > MOST_JOINTS:
         requirement = (
@@ -90,6 +104,8 @@ def to_pybullet(
         table("MOTORS", motors, "joint: position [rad or m], largest speed [rad/s or m/s]"),
         assignment("HOLDING_FORCE", HOLDING_FORCE, "[N m or N], of motors"),
         assignment("REST", _REST, "[rad or m], motion that settle() calls rest"),
+        table("OBSTACLES", _obstacles(robot.contact), "shape, sizes [m], position [m], quaternion x y z w, corners of a mesh"),
+        assignment("FRICTION", robot.contact.friction if robot.contact is not None else 0.0),
         assignment("QUIET_TIME", 1.0 / _slowest_decay(frequency, springs), "[s], for as long as this"),
     ]
     shapes = [shape for body in robot.tree.bodies for shape in (*body.visuals, *body.collisions)]
@@ -160,6 +176,16 @@ def _twists(model: SoftModel) -> dict[str, dict[str, float]]:
         tag.name: {name: value for name, value in zip(names, row, strict=True) if value != 0.0}
         for tag, row in zip(model.muscles, rows, strict=True)
     }
+
+
+def _obstacles(contact: ContactShapes | None) -> dict[str, tuple[Any, ...]]:
+    """By name, shape, sizes, place and corners of the obstacles."""
+    rows = {}
+    for name, shape in contact.obstacles.items() if contact is not None else ():
+        w, x, y, z = shape.placement.quaternion.tolist()
+        corners = [tuple(row) for row in contact.meshes[name].vertices.tolist()] if contact and name in contact.meshes else []
+        rows[name] = (shape.kind, shape.size, tuple(shape.placement.position.tolist()), (x, y, z, w), corners)
+    return rows
 
 
 def _inside_quotes(text: str) -> str:

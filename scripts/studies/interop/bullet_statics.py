@@ -41,7 +41,15 @@ def simulate(question: Question, seconds: float = SECONDS) -> Outcome:
         elapsed = time.perf_counter() - began
         speed = float(np.abs(file.state(robot)[1]).max(initial=0.0))
         contacts = len(pybullet.getContactPoints(robot.body, physicsClientId=client) or ())
-        return Outcome(joints, speed, contacts, 0, elapsed)
+        forces = {}
+        for name, body in robot.obstacles.items():
+            rows = pybullet.getContactPoints(robot.body, body, physicsClientId=client) or ()
+            pushes = [
+                np.multiply(row[9], row[7]) + np.multiply(row[10], row[11]) + np.multiply(row[12], row[13]) for row in rows
+            ]
+            if any(row[9] for row in rows):
+                forces[name] = np.sum(pushes, axis=0)
+        return Outcome(joints, speed, contacts, 0, elapsed, forces)
     finally:
         pybullet.disconnect(client)
 
