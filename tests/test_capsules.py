@@ -20,6 +20,7 @@ import softrobots as sr
 from softrobots.core.checks import FloatArray
 from softrobots.description.tag_reader import read_tags
 from softrobots.environment.capsules import robot_capsules
+from softrobots.identification.parameters import ParameterSet
 from softrobots.robots import XacroRobot
 from tests.support.laws import law
 
@@ -132,6 +133,17 @@ def test_other_numbers_make_other_capsules() -> None:
     long = sr.load_model(replace(base, link_lengths=(0.6, 0.8), radius=(0.055, 0.07), stiffness=172.0))
     assert robot_capsules(long)[3].end[0] - robot_capsules(sr.load_model(base))[3].end[0] == pytest.approx(0.2, rel=1e-12)
     assert robot_capsules(long)[3].radius == 0.07
+
+
+def test_a_model_that_is_fitted_has_the_capsules_of_its_numbers() -> None:
+    """The last link is as much longer, its root as much shorter."""
+    fitted = ParameterSet.of(
+        sr.InflatableArm(stiffness=170.0), ("link[2].link_lengths", "link[1].hinge_offset", "link[2].radius")
+    )
+    found = cores(fitted.model(np.array([0.7, 0.05, 0.06])))
+    lengths = [np.linalg.norm(end - start) for start, end, _ in found]
+    np.testing.assert_allclose(lengths, [0.05, 0.55, 0.03, 0.67], rtol=1e-12)
+    assert [radius for _, _, radius in found] == [0.055, 0.055, 0.06, 0.06]
 
 
 PLAIN = """<robot name="plain"><link name="base"/>
@@ -337,6 +349,15 @@ def test_a_robot_stands_on_a_floor_without_touching_it(sections: int, floor: obj
     model = sr.load_model(sr.PccArm(elastic_sections=sections, muscle_azimuths=(), radius=0.05))
     free = sr.solve_equilibrium(model, [], (2.0, 1.0, 0.0))
     found = sr.solve_equilibrium(model, [], (2.0, 1.0, 0.0), environment=sr.Environment([floor]))
+    assert not found.contacts
+    np.testing.assert_allclose(found.q_springs, free.q_springs, atol=1e-9)
+
+
+def test_a_tube_beside_its_actuator_stands_on_a_floor() -> None:
+    """The start of its centre line nearly stays, and is beside the first joint."""
+    model = sr.load_model(sr.HelixTube(length=0.4, elastic_sections=6, actuator="length"))
+    floor = sr.Environment([sr.HalfSpace((0, 0, 1))])
+    free, found = (sr.solve_equilibrium(model, model.relaxed_motors, (0.01, 0, 0), environment=one) for one in (None, floor))
     assert not found.contacts
     np.testing.assert_allclose(found.q_springs, free.q_springs, atol=1e-9)
 

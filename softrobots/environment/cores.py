@@ -103,6 +103,11 @@ class Cores:
     def _at_base(self, moving: Any) -> tuple[Any, Any]:
         points = self.at(pin.neutral(self._model)).ends.reshape(-1, 3)[self.single_ends]
         still = np.flatnonzero(~moving)
+        if not len(still):  # of a body beside the chain: the end beside the first joint, which nearly stays
+            beside = np.linalg.norm(points - self._model.jointPlacements[1].translation, axis=1)
+            still = np.flatnonzero(
+                (beside <= (1.0 + SAME_POINT) * self.radii[self.end_capsules]) & (beside == beside.min(initial=np.inf))
+            )
         if not len(still):
             return still, still
         apart = np.linalg.norm(points[:, None] - points[still], axis=2)
