@@ -76,6 +76,7 @@ def _tags(urdf: str, label: str) -> str:
         "sections": len(tags.sections),
         "lumped sections": len(tags.lumped_sections),
         "muscles": len(tags.muscles),
+        "capsules": len(tags.capsules),
     }
     return ", ".join(f"{count} {what}" for what, count in parts.items() if count) or "none"
 
