@@ -60,11 +60,26 @@ def test_the_probability_is_where_the_push_is() -> None:
     near = sum(one.probability for one in found if one.link == "link_2" and abs(one.point[0] - 0.35) < 0.06)
     assert near > 0.98
     assert np.linalg.norm(found[0].estimate.force - force) < 0.05 * np.linalg.norm(force)
+    assert not any(one.link == "link_2" and one.point[0] > 0.56 for one in found)  # the end would have to be pulled
     links = {one.link: 0.57 / 8 if one.link in ("link_1", "link_2") else 0.03 / 8 for one in found}  # lengths of the pieces
     left = [np.sum((torques - one.estimate.equilibrium.motor_torques) ** 2) / 0.05**2 for one in found]
     likely = np.array([links[one.link] for one in found]) * np.exp(-0.5 * (np.array(left) - min(left)))
     assert np.allclose([one.probability for one in found], likely / likely.sum(), rtol=1e-6, atol=1e-12)
     assert [one.misfit for one in found] == pytest.approx(left, rel=1e-6, abs=1e-9)
+
+
+def test_a_push_on_the_end_is_found_there(arm: sr.SoftModel) -> None:
+    """The arm leans on a wall with the round end of its body: the force has a part along the link, as at no other place."""
+    wall = sr.Environment([sr.HalfSpace((-1.0, 0.2, -0.1), -1.0)])
+    leaning = sr.solve_equilibrium(arm, (0.3, 0.4, -0.3), gravity=sr.EARTH_GRAVITY, environment=wall)
+    (contact,) = leaning.contacts
+    options: dict[str, Any] = {"torque_std": 0.02, "gravity": sr.EARTH_GRAVITY, "count": 4}
+    best, *others = sr.locate_contact(arm, leaning.q_motors, leaning.motor_torques, **options)
+    assert best.link == "link_2"
+    assert np.allclose(best.point, (0.57, 0.0, 0.0), atol=1e-12)  # of a link of 0.6 m, behind its hinge
+    assert best.probability > 0.8 > 0.2 > max(one.probability for one in others)
+    assert best.misfit < 1e-6
+    assert np.abs(best.estimate.force - contact.force).max() < 1e-6 * contact.normal_force
 
 
 def test_a_push_on_the_first_link_may_be_anywhere_on_it() -> None:

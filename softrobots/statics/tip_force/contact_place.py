@@ -1,16 +1,16 @@
 r"""Where something touches a robot, from motor torques: the place along the body that explains them best.
 
-A contact without friction presses across the axis of the body. At each candidate place the two components of such a force are
-fitted; with independent errors of the torques of known size the likelihood of a place is :math:`\exp(-\chi^2 / 2)`, with the
-squares that the fit leaves. Three motors tell a force on a link beyond them all, and its place; of one on a nearer link they
-tell less, and many places are as likely.
+A contact without friction presses across the axis of the body, or on a free end, from any side. At each candidate place the
+components of such a force are fitted; with independent errors of the torques of known size the likelihood of a place is
+:math:`\exp(-\chi^2 / 2)`, with the squares that the fit leaves. Three motors tell a force on a link beyond them all, and its
+place; of one on a nearer link they tell less, and many places are as likely.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +24,7 @@ from softrobots.statics.load_estimation import LoadEstimate, estimate_load
 
 _ROUNDS = 20  # of the direction of the force, which turns with the body that bends under it
 _SAME = 1e-9  # change of a direction that is none [-]
+_APART = 1e-6  # distance of ends of cores that are no joint, relative to the reach
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,13 +61,14 @@ def locate_contact(
         motor_torques: Load on each motor, shape (n_motors,) [N m or N], as for `softrobots.estimate_load`.
         torque_std: Standard deviation of the torque noise, one number or shape (n_motors,) [N m].
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-        places: Candidates by link: points in its axes, shape (n, 3) [m], and the axis across which the force is, shape (3,), as
-            `{link: (points, axis)}`. By default points along the axis of every capsule of the robot that moves.
+        places: Candidates by link: points in its axes, shape (n, 3) [m], and the axis across which the force is, shape (3,), or
+            None for any force, as `{link: (points, axis)}`. By default points along the axis of every capsule of the robot that
+            moves, and the middles of its free ends, where forces that push are fitted.
         count: Number of candidates on each capsule.
 
     Returns:
-        All candidates, the most probable first; each capsule weighs by its length, given points alike. Add probabilities of
-        neighbours for that of a stretch of the body.
+        All candidates, the most probable first; each capsule weighs by its length, an end by a quarter of its circumference,
+        given points alike. Add probabilities of neighbours for that of a stretch of the body.
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range, the robot has fewer than two motors
@@ -77,20 +79,27 @@ def locate_contact(
     if check_model(model).n_motors < 2:
         raise ParameterError("model", model, "a robot with at least two motors")
     noise = one_each("torque_std", torque_std, model.n_motors, "N m", positive=True)
-    rows = _along_capsules(model, positive_integer("count", count, 1000)) if places is None else _given(places)
-    marked = with_points(model, {f"place {number}": row[:2] for number, row in enumerate(rows)})
+    rows = _on_body(model, positive_integer("count", count, 1000)) if places is None else _given(places)
+    marked = with_points(model, {f"place {number}": (row.link, row.point) for number, row in enumerate(rows)})
     found = []
-    for number, (link, point, axis, weight) in enumerate(rows):
+    for number, (link, point, axis, outward, weight) in enumerate(rows):
         options = {"frame": f"place {number}", "gravity": gravity, "torque_std": noise, "restart": False}
         try:
-            estimate = _across(marked, link, axis, q_motors, motor_torques, options)
+            estimate = _fitted(marked, link, axis, q_motors, motor_torques, options)
         except NeutralEquilibrium:
             continue
+        if (
+            outward is not None
+            and estimate.force @ frame_placement(marked, estimate.equilibrium.q, link).rotation @ outward > 0.0
+        ):
+            continue  # it would have to pull at the end
         felt = model.actuators.feels
         missing = (estimate.measured_torques - estimate.equilibrium.motor_torques)[felt] / noise[felt]
         found.append((link, read_only(np.array(point)), estimate, float(missing @ missing), weight))
     if not found:
-        raise ParameterError("places", [row[:2] for row in rows], "places at which a force has an equilibrium")
+        raise ParameterError(
+            "places", [(row.link, row.point.tolist()) for row in rows], "places at which a force has an equilibrium"
+        )
     misfits, weights = (np.array([row[place] for row in found]) for place in (3, 4))
     likely = weights * np.exp(0.5 * (misfits.min() - misfits))
     shares = (likely / likely.sum()).tolist()
@@ -98,17 +107,33 @@ def locate_contact(
     return tuple(sorted(located, key=lambda one: (-one.probability, one.misfit)))
 
 
-def _across(
-    marked: SoftModel, link: str, axis: FloatArray, q_motors: Any, torques: Any, options: dict[str, Any]
+class _Candidate(NamedTuple):
+    """A place where something may touch."""
+
+    link: str
+    point: FloatArray
+    axis: FloatArray | None
+    """The force is across it, shape (3,), in the axes of the link; None: any force."""
+    outward: FloatArray | None
+    """Out of a free end, along which no contact pulls; None elsewhere."""
+    weight: float
+
+
+def _fitted(
+    marked: SoftModel, link: str, axis: FloatArray | None, q_motors: Any, torques: Any, options: dict[str, Any]
 ) -> LoadEstimate:
-    """Fit a force across an axis of a link; the axis turns with the link under the force."""
-    q, last, across = marked.configuration(q_motors), np.zeros((3, 3)), np.linalg.svd(axis[None])[2][1:]
+    """Fit a force, across an axis of a link if there is one; the axis turns with the link under the force."""
+    q, last, across = marked.configuration(q_motors), np.zeros((3, 3)), None
+    if axis is not None:
+        across = np.linalg.svd(axis[None])[2][1:]
     for _ in range(_ROUNDS):
-        directions = across @ frame_placement(marked, q, link).rotation.T
+        directions = None if across is None else across @ frame_placement(marked, q, link).rotation.T
         try:
             estimate = estimate_load(marked, q_motors, torques, directions=directions, **options)
         except LoadNotFound as error:  # this place explains the torques badly
             estimate = error.best
+        if directions is None:
+            break
         q, plane = estimate.equilibrium.q, directions.T @ directions
         if np.abs(plane - last).max() <= _SAME:
             break
@@ -116,29 +141,36 @@ def _across(
     return estimate
 
 
-def _along_capsules(model: SoftModel, count: int) -> list[tuple[str, FloatArray, FloatArray, float]]:
-    """Link, point, axis and weight of the middles of equal pieces of each capsule that moves."""
-    rows = []
-    for one in robot_capsules(model):
+def _on_body(model: SoftModel, count: int) -> list[_Candidate]:
+    """The middles of equal pieces of each capsule that moves, and the ends of cores at which no other core ends."""
+    rows, capsules, q = list[_Candidate](), robot_capsules(model), model.configuration(model.relaxed_motors)
+    poses = [frame_placement(model, q, one.link) * model.pinocchio.frames[one.frame].placement.inverse() for one in capsules]
+    ends = np.array([pose.act(end) for pose, one in zip(poses, capsules, strict=True) for end in (one.start, one.end)])
+    for number, one in enumerate(capsules):
         placement, along = model.pinocchio.frames[one.frame].placement, one.end - one.start
         length = float(np.linalg.norm(along))
         if one.joint == 0 or length == 0.0:
             continue
+        axis = placement.rotation.T @ along / length
         for share in (np.arange(count) + 0.5) / count:
             point = placement.actInv(one.start + share * along)
-            rows.append((one.link, point, placement.rotation.T @ along / length, length / count))
+            rows.append(_Candidate(one.link, point, axis, None, length / count))
+        for place, (end, outward) in enumerate(((one.start, -axis), (one.end, axis))):
+            others = np.delete(ends, 2 * number + place, axis=0)
+            if np.linalg.norm(others - ends[2 * number + place], axis=1).min() > _APART * model.reach:
+                rows.append(_Candidate(one.link, placement.actInv(end), None, outward, 0.5 * np.pi * one.radius))
     return rows
 
 
-def _given(places: Any) -> list[tuple[str, FloatArray, FloatArray, float]]:
+def _given(places: Any) -> list[_Candidate]:
     """The same of given places, of equal weight."""
     if not isinstance(places, Mapping) or not places:
         raise ParameterError("places", places, "a mapping {link: (points, axis)}")
-    rows = []
+    rows = list[_Candidate]()
     for link, value in places.items():
         if not isinstance(value, tuple) or len(value) != 2:
             raise ParameterError(f"places[{link!r}]", value, "(points, axis), shapes (n, 3) and (3,)")
         points = finite_array(f"places[{link!r}]", value[0], (None, 3), "m")
-        axis = unit_vector(f"places[{link!r}]", value[1])
-        rows += [(str(link), point, axis, 1.0) for point in points]
+        axis = None if value[1] is None else unit_vector(f"places[{link!r}]", value[1])
+        rows += [_Candidate(str(link), point, axis, None, 1.0) for point in points]
     return rows
