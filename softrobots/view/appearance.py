@@ -20,6 +20,8 @@ FORCE_COLOUR = 0x009E73
 """Green of the forces."""
 CONTACT_COLOUR = 0x6633F2
 """Violet of the points where a robot touches something, and of the forces there."""
+CAPSULE_COLOUR = (0.40, 0.20, 0.95, 0.12)
+"""Red, green, blue, opacity of the capsules of a robot, which are what touches obstacles."""
 OBSTACLE_COLOUR = (0.40, 0.80, 0.80, 0.30)
 """Red, green, blue, opacity of obstacles, as of glass."""
 FLOOR_COLOUR = 0xB8C0C8

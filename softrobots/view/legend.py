@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.view.appearance import (
+    CAPSULE_COLOUR,
     CONTACT_COLOUR,
     FORCE_COLOUR,
     LINE_COLOUR,
@@ -66,6 +67,7 @@ def legend(
     entries += [LegendEntry(FORCE_COLOUR, "force")] * any(
         not one.of_contact for state in states for one in state.arrows.values()
     )
+    entries += [LegendEntry(CAPSULE_COLOUR, "capsules of links, which touch")] * any(state.capsules for state in states)
     entries += [LegendEntry(OBSTACLE_COLOUR, "obstacle")] * any(state.obstacles for state in states)
     entries += contact_entries([state.contacts for state in played or (scene,)])
     above = 1.0

@@ -31,7 +31,7 @@ from softrobots.view.animation_frames import (
 )
 from softrobots.view.body import BentSections, SegmentBody
 from softrobots.view.robot_shapes import RobotShapes
-from softrobots.view.surroundings import DrawnContact, DrawnObstacle, drawn_contacts, drawn_obstacles
+from softrobots.view.surroundings import DrawnContact, DrawnObstacle, drawn_capsules, drawn_contacts, drawn_obstacles
 from softrobots.view.tension_scale import DrawnActuator, drawn_actuators
 
 WRINKLING_COLOURS = (
@@ -97,6 +97,8 @@ class Scene:
     """The obstacles around it."""
     contacts: Mapping[str, DrawnContact] = field(default_factory=dict)
     """Where it touches them."""
+    capsules: Sequence[DrawnObstacle] = ()
+    """What touches of a robot of links among obstacles."""
     grown: float | None = None
     """Share of a growing tube that has everted; None if the robot does not grow."""
 
@@ -217,6 +219,7 @@ class SceneBuilder:
             arrows=_arrows(model, load, q, contacts),
             obstacles=self._obstacles(load.environment),
             contacts=contacts,
+            capsules=() if load.environment is None else drawn_capsules(model, q),
         )
 
     def _moving_levels(self, frame: Frame, load: Load, q: FloatArray) -> list[int]:

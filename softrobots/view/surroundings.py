@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import coal
 import numpy as np
+import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.environment.capsules import robot_capsules
 from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
+from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.view.mesh_triangles import Triangles
 
@@ -18,10 +22,10 @@ _ROUND = (16, 32)  # rings and corners of the ends of a capsule
 
 
 class DrawnObstacle(NamedTuple):
-    """An obstacle."""
+    """An obstacle, or a capsule of the robot."""
 
     name: str
-    """Its name in the environment."""
+    """Name of the obstacle in the environment, or of the link."""
     geometry: Any
     """A `coal` shape, or the `softrobots.view.mesh_triangles.Triangles` of others."""
     pose: FloatArray
@@ -72,6 +76,32 @@ def drawn_contacts(equilibrium: Equilibrium) -> dict[str, DrawnContact]:
     return found
 
 
+def drawn_capsules(model: SoftModel, q: FloatArray) -> tuple[DrawnObstacle, ...]:
+    """Return the capsules of a robot of links at a configuration, shape (nq,); none of sections, whose body shows them."""
+    if model.structure.section_table:
+        return ()
+    pin_model, data = model.workspace(None)
+    pin.forwardKinematics(pin_model, data, q)
+    drawn = []
+    for one in robot_capsules(model):
+        start, end = (np.array(data.oMi[one.joint].act(point)) for point in (one.start, one.end))
+        length, pose = float(np.linalg.norm(one.end - one.start)), np.eye(4)
+        pose[:3, 3] = 0.5 * (start + end)
+        if length > 0.0:
+            pose[:3, :3] = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), (end - start) / length).matrix()
+        drawn.append(DrawnObstacle(one.link, _capsule(one.radius, length), pose))
+    return tuple(drawn)
+
+
+@lru_cache(maxsize=256)
+def _capsule(radius: float, length: float) -> Triangles:
+    """Triangles of a capsule along z."""
+    from trimesh.creation import capsule
+
+    solid = capsule(height=length, radius=radius, count=_ROUND)
+    return Triangles(np.array(solid.vertices), np.array(solid.faces))
+
+
 def _solid(obstacle: Any, centre: FloatArray, size: float, ground: float) -> tuple[Any, FloatArray]:
     """Geometry of an obstacle and its pose."""
     if isinstance(obstacle, HalfSpace):
@@ -85,10 +115,7 @@ def _solid(obstacle: Any, centre: FloatArray, size: float, ground: float) -> tup
         case Cylinder():
             return coal.Cylinder(obstacle.radius, obstacle.length), pose
         case Capsule():
-            from trimesh.creation import capsule
-
-            solid = capsule(height=obstacle.length, radius=obstacle.radius, count=_ROUND)
-            return Triangles(np.array(solid.vertices), np.array(solid.faces)), pose
+            return _capsule(obstacle.radius, obstacle.length), pose
     return Triangles(np.array(obstacle.vertices), np.array(obstacle.triangles)), pose
 
 

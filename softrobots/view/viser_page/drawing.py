@@ -108,9 +108,11 @@ class ViserDrawing:
                 yield f"load/{name}", Mesh(*revolved(heights - heights[-1], radii), along_z, appearance.CONTACT_COLOUR)
             else:
                 yield f"load/{name}", Mesh(*revolved(heights, radii), along_z, appearance.FORCE_COLOUR)
-        for number, obstacle in enumerate(scene.obstacles):
-            corners, faces, flat = triangles(obstacle.geometry)
-            yield f"obstacles/{number}", Mesh(corners, faces, obstacle.pose, appearance.OBSTACLE_COLOUR, flat)
+        looks = {"obstacles": appearance.OBSTACLE_COLOUR, "capsules": appearance.CAPSULE_COLOUR}
+        for (kind, colour), solids in zip(looks.items(), (scene.obstacles, scene.capsules), strict=True):
+            for number, solid in enumerate(solids):
+                corners, faces, flat = triangles(solid.geometry)
+                yield f"{kind}/{number}", Mesh(corners, faces, solid.pose, colour, flat)
         ball = triangles(coal.Sphere(appearance.CONTACT_SIZE * self._extent.size))[:2]
         for name, contact in scene.contacts.items():
             placed = np.eye(4)
