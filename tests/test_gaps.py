@@ -16,10 +16,12 @@ from scipy.spatial.transform import Rotation
 
 import softrobots as sr
 from softrobots.environment.capsules import robot_capsules
+from softrobots.environment.cores import cores_of
 from softrobots.environment.gaps import Gaps, Surroundings
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.obstacle_fields import obstacle_fields
 from softrobots.environment.obstacles import Obstacle
+from softrobots.environment.self_contact import self_contact_pairs
 from softrobots.model.joint_loads import Entries
 
 POSITION, ROTATION = (0.7, 0.1, -0.25), Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
@@ -145,9 +147,10 @@ def test_derivatives_of_gaps_are_slopes_of_gaps_and_of_gradients(arm: sr.SoftMod
 
 
 def test_a_folded_robot_is_as_far_from_itself_as_by_minimisation(arm: sr.SoftModel) -> None:
-    """Three links: SciPy's minimum over both cores, to its tolerance; derivatives by differences."""
-    robot = sr.load_model(sr.InflatableArm(link_lengths=(0.6, 0.6, 0.6)))
-    surroundings, random, features = Surroundings(robot, sr.Environment([], self_contact=True)), np.random.default_rng(5), set()
+    """Four links: SciPy's minimum over both cores, to its tolerance; derivatives by differences."""
+    robot = sr.load_model(sr.InflatableArm(link_lengths=(0.4,) * 4, stiffness=100.0))
+    surroundings, random, features = Surroundings(robot, sr.Environment([], self_contact=True)), np.random.default_rng(0), set()
+    crossing = 0
     for _ in range(8):
         q = random.uniform(-1.3, 1.3, robot.pinocchio.nv)
         gaps, cores = surroundings.at(q, 1.0), cores_at(robot, q)
@@ -156,9 +159,48 @@ def test_a_folded_robot_is_as_far_from_itself_as_by_minimisation(arm: sr.SoftMod
             square = lambda s, a=a, b=b, c=c, d=d: float(((a + s[0] * (b - a) - c - s[1] * (d - c)) ** 2).sum())  # noqa: E731
             found = minimize(square, [0.5, 0.5], bounds=[(0.0, 1.0)] * 2, options={"ftol": 1e-16, "gtol": 1e-13})
             assert gaps.values[row] == pytest.approx(np.sqrt(found.fun) - one - two, abs=1e-9)
+            crossing += int(0.01 < found.x[0] < 0.99 and 0.01 < found.x[1] < 0.99)
             assert surroundings.names[gaps.obstacles[row]] == surroundings.links[gaps.obstacles[row]]
         features |= compare_derivatives(surroundings, q, 1.0)
-    assert features == {0, 1, 2} or features == {1, 2}
+    assert {1, 2} <= features
+    assert crossing > 0
+
+
+def test_which_capsules_may_touch_each_other() -> None:
+    """A straight tube: those that it can bring together by bending to half a circle of its radius."""
+    robot, radius = sr.load_model(sr.PccArm(segment_lengths=(0.4, 0.4), elastic_sections=4, radius=0.04)), 0.04
+    capsules = [one for one in robot_capsules(robot) if one.joint > 0]
+    lengths = [np.linalg.norm(one.end - one.start) for one in capsules]
+    count = len(capsules)
+    between = {(i, j): sum(lengths[j + 1 : i]) for i in range(count) for j in range(i)}
+    assert {one.radius for one in capsules} == {radius}
+    pairs = self_contact_pairs(robot, cores_of(robot)).tolist()
+    assert {tuple(pair) for pair in pairs} == {pair for pair, way in between.items() if way >= np.pi * radius}
+    assert 0 < len(pairs) < len(between)
+
+
+def test_ends_that_neighbours_share_count_once() -> None:
+    """Along a tube over a floor; where the radius changes at a joint, both count, for they touch at different heights."""
+    for radii, doubles in ((0.055, 0), ((0.055, 0.04), 1)):
+        robot = sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.5), radius=radii, stiffness=100.0))
+        gaps = Surroundings(robot, sr.Environment([sr.HalfSpace((0, 0, 1), -0.2)])).at(np.zeros(7), 1.0)
+        places = np.sort(gaps.core_points[:, 0])
+        assert int((np.diff(places) < 1e-9).sum()) == doubles
+        assert np.allclose(gaps.values, 0.2 - gaps.radii)
+
+
+def test_two_faces_that_meet_at_a_corner_alone_are_a_corner() -> None:
+    """Above the top of a pyramid the normal is the sum of two opposite faces' normals, and the distance that from a point."""
+    pyramid = sr.Mesh([(1, 1, 0), (1, -1, 0), (-1, 1, 0), (-1, -1, 0), (0, 0, 1)])
+    ((field, _),) = obstacle_fields(sr.Environment([pyramid]))
+    for x, y in ((0.0, 0.0), (0.05, 0.0), (0.0, -0.05)):
+        point = np.array([[x, y, 1.5]])
+        distance, normal = field.at(point, np.zeros(1, dtype=int))
+        directions, weights = field.curvature(point, np.zeros(1, dtype=int))
+        away = np.array([x, y, 0.5])
+        assert distance[0] == pytest.approx(np.linalg.norm(away), abs=1e-15)
+        expected = (np.eye(3) - np.outer(normal[0], normal[0])) / distance[0]
+        assert np.allclose(np.einsum("k,ki,kj", weights[0], directions[0], directions[0]), expected, atol=1e-12)
 
 
 def test_neighbours_do_not_touch_each_other(arm: sr.SoftModel) -> None:

@@ -66,8 +66,9 @@ def core_points(
     used = np.asarray(crossed.any(axis=0)).nonzero()[0]
     shares = np.zeros((len(which), len(used) + 2))
     shares[:, -1] = 1.0
-    order = np.where(crossed, borders, 1.0).take(used, 1).argsort(axis=1)
-    shares[:, 1:-1] = np.take_along_axis(np.where(crossed, borders, 1.0).take(used, 1), order, 1)
+    borders = np.where(crossed, borders, 1.0).take(used, 1)
+    order = borders.argsort(axis=1)
+    shares[:, 1:-1] = np.sort(borders, axis=1)
     points = starts[:, None] + shares[:, :, None] * spans[:, None]
     flat = field.at(points.reshape(-1, 3), which.repeat(shares.shape[1]))
     distances, normals = flat[0].reshape(shares.shape), flat[1].reshape(points.shape)
