@@ -16,6 +16,7 @@ import pytest
 from scipy.optimize import root
 
 import softrobots as sr
+from softrobots.cli import main as cli
 from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Surroundings
@@ -259,6 +260,35 @@ def test_meshes_of_drake_stand_beside_its_file(tmp_path: Path) -> None:
     rows = [line.split() for line in file.read_text().splitlines()]
     assert sorted(tuple(map(float, row[1:])) for row in rows if row[0] == "v") == sorted(map(tuple, corners.tolist()))
     assert sum(row[0] == "f" for row in rows) == 4
+
+
+def test_the_command_takes_obstacles_from_a_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    environment = around(1.2)
+    (tmp_path / "room.yaml").write_text(environment.to_yaml())
+    words = ["export", "inflatable_arm", "--environment", str(tmp_path / "room.yaml"), "--friction", "0.4", "-o"]
+    assert cli.main([*words, str(tmp_path / "arm.xml")]) == 0
+    assert f"{len(environment)} obstacles" in capsys.readouterr().out
+    arm = sr.load_model(sr.InflatableArm())
+    assert (tmp_path / "arm.xml").read_text() == to_mjcf(arm, environment=environment, friction=0.4)
+    assert cli.main([*words, str(tmp_path / "arm.json")]) == 2
+    assert "--friction must be left out for json" in capsys.readouterr().err
+
+
+@pytest.mark.study
+def test_an_arm_with_driven_tendons_leans_in_mujoco(tool: Tool) -> None:
+    """Elastic tendons as actuators: at rest, with our force within the error of their legs, of second order in the hinges."""
+    mujoco = tool("mujoco")
+    arm = sr.load_model(sr.TendonArm(chain="lumped", hinges=5))
+    motors = arm.relaxed_motors - np.array([0, 0, 0, 2e-3, 0, 0, 4e-3, 0, 0])
+    wall = sr.Environment([sr.HalfSpace((-1, 0, 0), -0.03, name="wall")])
+    ours = sr.solve_equilibrium(arm, motors, gravity=sr.EARTH_GRAVITY, environment=wall)
+    model = mujoco.MjModel.from_xml_string(to_mjcf(arm, motors, gravity=sr.EARTH_GRAVITY, environment=wall))
+    data = mujoco.MjData(model)
+    mujoco.mj_resetDataKeyframe(model, data, 0)
+    mujoco.mj_step(model, data, 3000)
+    assert np.abs(data.qvel).max() < 1e-9
+    force = mujoco_statics.obstacle_forces(mujoco, model, data)["wall"]
+    assert np.abs(force - ours.contacts[0].force).max() < 3e-3 * ours.contacts[0].normal_force
 
 
 def test_the_sidecar_holds_the_obstacles(tmp_path: Path) -> None:

@@ -6,7 +6,8 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-from softrobots.cli.options.command_line import add_gravity, gravity_of
+from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
+from softrobots.cli.options.load_argument import add_environment, environment_of
 from softrobots.cli.options.robot_argument import add_model, add_motors, model_of, motors_of, source_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.files import new_file
@@ -16,6 +17,7 @@ from softrobots.robots import XacroRobot
 _EXAMPLES = """examples:
   softrobots export inflatable_arm -o arm.xml --gravity
   softrobots export arm.urdf -o arm.sdf --welded --motors 0.3 0.6 -0.8
+  softrobots export inflatable_arm --environment room.yaml --friction 0.4 -o arm_in_room.xml
   softrobots export pcc_arm_lumped --set hinges=6 -o pcc.xml
   softrobots export pcc_arm_lumped --muscles forces --welded --motors 20 5 5 10 0 0 -o pcc.sdf
   softrobots export helix_tube_lumped --format pybullet -o helix.py
@@ -45,6 +47,8 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--damping", type=_damping, metavar="file|TIME|critical", help=help_text)
     add_gravity(parser)
+    add_environment(parser)
+    add_numbers(parser, "--friction", "MU", "coefficient of friction of the obstacles [-] (0)")
     parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -57,6 +61,8 @@ def run(arguments: argparse.Namespace) -> None:
         "actuators": "welded" if arguments.welded else None,
         "damping": arguments.damping,
         "gravity": gravity_of(arguments),
+        "environment": environment_of(arguments),
+        "friction": arguments.friction,
     }
     options = {option: value for option, value in chosen.items() if value is not None}
     new_file(arguments.output, overwrite=arguments.overwrite)  # refused before the work
@@ -71,8 +77,10 @@ def run(arguments: argparse.Namespace) -> None:
     counts = {"sections": len(structure.section_table) if structure.constant_strain else 0}
     counts |= {"springs": len(structure.spring_joints), "actuators": model.n_motors}
     answer = {"files": [path], "robot": model.pinocchio.name, "format": name, **counts, "welded": arguments.welded}
+    answer["obstacles"] = list(options["environment"].names) if "environment" in options else []
     sections = f"{counts['sections']} sections, " if counts["sections"] else ""
     kept = f"{sections}{counts['springs']} springs, {model.n_motors}{' welded' if arguments.welded else ''} actuators"
+    kept += f", {len(answer['obstacles'])} obstacles" if answer["obstacles"] else ""
     print_answer(arguments, answer, [f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}"])
 
 

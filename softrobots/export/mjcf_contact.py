@@ -36,12 +36,13 @@ SOFTNESS = (
 
 
 def write_contact_defaults(root: ElementTree.Element, option: ElementTree.Element, friction: float) -> None:
-    """Make contact hard, with a coefficient of friction."""
+    """Make contact hard and exact, with a coefficient of friction."""
     contact = {
         "solref": number_text((_TIME_CONSTANT, 1.0)),
         "solimp": number_text((_IMPEDANCE, _IMPEDANCE, 0.001, 0.5, 2.0)),
         "condim": "1",
     }
+    option.set("tolerance", "1e-14")  # of the solver; with that of 1e-8, light robots never rest
     if friction:
         contact |= {"condim": "3", "friction": number_text((friction, 0.0, 0.0))}
         option.attrib |= {"cone": "elliptic", "impratio": "100.0"}  # Coulomb's cone; sticking contacts hardly creep
