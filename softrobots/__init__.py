@@ -57,7 +57,9 @@ from softrobots.robots.growth import grown_coordinates
 from softrobots.statics.buckling.critical_load import critical_load
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.buckling.post_buckling import post_buckling_branches
+from softrobots.statics.contact.contact_path import ContactPath
 from softrobots.statics.contact.contact_sensitivity import contact_sensitivity
+from softrobots.statics.contact.follow_contact import follow_contact
 from softrobots.statics.contact.grasp import contact_wrench, is_force_closure, pull_out_force
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.imposed_displacement import ImposedDisplacement, solve_imposed_displacement
@@ -85,6 +87,7 @@ __all__ = [
     "Capsule",
     "ClosedLoop",
     "ClusterError",
+    "ContactPath",
     "CrossValidation",
     "Cylinder",
     "DescriptionError",
@@ -150,6 +153,7 @@ __all__ = [
     "elastostatic_jacobian",
     "estimate_load",
     "export",
+    "follow_contact",
     "follow_trajectory",
     "grown_coordinates",
     "helix",

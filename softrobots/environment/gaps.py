@@ -57,7 +57,7 @@ class Gaps:
         """Radii of the capsules, shape (m,) [m]."""
         self.values: FloatArray = found.distances - self.radii
         """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
-        self._cores, self.places, self._parts, self._transforms, self._reach = cores, places, found.parts, transforms, reach
+        self._cores, self.places, self.parts, self._transforms, self._reach = cores, places, found.parts, transforms, reach
 
     def __len__(self) -> int:
         """Number of candidates."""
@@ -168,7 +168,7 @@ class Gaps:
         """
         nv = self.places.jacobian.shape[1]
         found, weights, first = [np.zeros((0, nv))], [np.zeros(0)], 0
-        for field, which in self._parts:
+        for field, which in self.parts:
             if not isinstance(field, HalfSpaces):
                 rows = first + forces[first : first + len(which)].nonzero()[0]
                 if len(rows) and self.obstacles[first] >= len(self._transforms):

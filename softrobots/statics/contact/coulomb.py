@@ -1,0 +1,257 @@
+r"""Equilibrium in contact with Coulomb friction over one small step: the semismooth Newton of Alart and Curnier.
+
+Unknown are the elastic coordinates `y`, and for each near contact the normal force :math:`\lambda_n` [N] and the friction
+:math:`\lambda_t` [N] in its tangent plane. With the gap `g`, its gradient `G`, the sliding `s` since the last state and the
+tangential Jacobian `T` of the touching material points, an equilibrium at the end of the step is a zero of
+
+.. math:: r(y) - G^T \lambda_n - T^T \lambda_t, \qquad \lambda_n - \max(0, \lambda_n - \rho g), \qquad
+   \lambda_t - \Pi_{\mu \lambda_n}(\lambda_t - \rho s),
+
+where :math:`\Pi_a` is the nearest point of the disk of radius `a` (P. Alart, A. Curnier, A mixed formulation for frictional
+contact problems prone to Newton like solution methods, Computer Methods in Applied Mechanics and Engineering 92, 1991, section
+4; implicit in time: the friction at the end of the step opposes the sliding in it). Without friction only `y` and
+:math:`\lambda_n` are left. The contacts that press (:math:`\lambda_n > \rho g`) stand in one dense system, which is not
+symmetric; where it is singular (more contacts than the robot has coordinates) the smallest change of forces is taken.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
+
+MOST_EVALUATIONS = 40
+"""Evaluations within a step of a path."""
+
+LARGEST_STEP = 0.5
+"""Norm of the largest Newton step [rad]."""
+
+GAP = 1e-11
+"""Penetration, and sliding of a contact that sticks, that are none, relative to the reach."""
+
+CONE = 1e-10
+"""Violation of the law of friction that is none, relative to the largest normal force."""
+
+_MOTIONLESS = 1e-6  # motion of a point that no spring can move, over the reach and a radian
+_OPENING = 100.0  # weight of a gap against a force, over the stiffness of the springs, where contacts are taken as open
+_FULL_STEPS = 12  # Newton steps before they are halved
+_HALVINGS = 5  # of a Newton step
+_RANK = 1e-12  # singular values below this, relative to the largest, are none
+
+
+class NearContacts(NamedTuple):
+    """Contacts that may press, at given elastic coordinates; `m` of them."""
+
+    gaps: FloatArray
+    """Gaps, shape (m,) [m]."""
+    gradients: FloatArray
+    """Derivative of the gaps, shape (m, n) [m/rad]."""
+    sliding: FloatArray
+    """Sliding since the last state along two unit vectors of each tangent plane, shape (m, 2) [m]."""
+    jacobian: FloatArray
+    """Motion of the touching points along them, shape (m, 2, n) [m/rad]."""
+
+
+class Balance(NamedTuple):
+    """Elastic coordinates and forces of contacts of a step, in equilibrium or not."""
+
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n,) [rad or m]."""
+    contacts: NearContacts
+    """The contacts there."""
+    normal: FloatArray
+    """Normal forces, shape (m,) [N]."""
+    friction: FloatArray
+    """Friction along the vectors of `NearContacts.sliding`, shape (m, 2) [N]."""
+    residual: FloatArray
+    """Torque out of balance, shape (n,) [N m or N]."""
+    tangent: FloatArray
+    """Derivative of the residual at the forces given, shape (n, n)."""
+    allowed: float
+    """Residual that counts as none [N m]."""
+    laws: Laws
+    """What each contact does."""
+
+    @property
+    def sticks(self) -> Any:
+        """Which contacts press and stick, shape (m,), bool."""
+        return self.laws.sticks
+
+
+class Laws(NamedTuple):
+    """What each contact does at an iterate, in units in which springs and contacts have stiffness 1."""
+
+    pressed: Any
+    """Which contacts press, shape (m,), bool."""
+    sticks: Any
+    """Which of them stick, shape (m,), bool."""
+    slips: Any
+    """Which of them slip, shape (m,), bool."""
+    way: FloatArray
+    """Direction of the friction that was tried, shape (m, 2)."""
+    held: FloatArray
+    """Largest friction over the one tried, shape (m,)."""
+    broken: FloatArray
+    """Friction less that of its law, shape (m, 2) [N]."""
+    root: FloatArray
+    """Square root of the scale of stiffness of each spring, shape (n,)."""
+    unit_normal: FloatArray
+    """Unit of normal forces, shape (m,)."""
+    unit_friction: FloatArray
+    """Unit of friction, shape (m,)."""
+    merit: float
+    """Norm of all equations in these units."""
+
+
+class Step(Protocol):
+    """A robot in a step of a path."""
+
+    stiffness: FloatArray
+    """Stiffness of the springs, a scale, shape (n,) [N m/rad or N/m]."""
+    reach: float
+    """Length of the robot, a scale [m]."""
+
+    def contacts(self, q_springs: FloatArray) -> NearContacts | None:
+        """Return the near contacts; None out of the range of a section."""
+
+    def mark(self) -> Any:
+        """Return a mark of the place asked last."""
+
+    def return_to(self, mark: Any) -> None:
+        """Return to the place of a mark, as if it had been asked last."""
+
+    def carried(self, normal: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the forces that these contacts had at the place asked before, shapes (m,) and (m, 2) [N]."""
+
+    def residual(self, normal: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """Return torque out of balance, its derivative and the torque that counts as none at the last place asked."""
+
+
+def solve_step(step: Step, start: FloatArray, coefficient: float) -> tuple[Balance | None, int]:
+    """Solve a step from elastic coordinates, shape (n,).
+
+    First by full Newton steps; where these do not converge, by steps that are halved while they do not lower the norm of all
+    equations: full steps get over changes of contacts more quickly, and halved ones do not go round in circles.
+
+    Args:
+        step: The robot.
+        start: Elastic coordinates to start from, shape (n,).
+        coefficient: Friction coefficient.
+
+    Returns:
+        The equilibrium, None if there is none or it is not found; and the evaluations spent.
+    """
+    start_place, spent = step.mark(), 0
+    for halvings, most in ((1, _FULL_STEPS), (_HALVINGS, MOST_EVALUATIONS)):
+        step.return_to(start_place)
+        here, first = _balance(step, start, np.zeros(0), np.zeros((0, 2)), coefficient, step.stiffness), spent
+        spent += 1
+        while here is not None and spent < first + most:
+            if _converged(step, here, coefficient):
+                return here, spent
+            change = _newton_change(here, coefficient)
+            if change is None:
+                break
+            scale = np.maximum(step.stiffness, here.tangent.diagonal())
+            share = min(1.0, LARGEST_STEP / max(float(np.linalg.norm(change[0])), 1e-300))
+            base, there = step.mark(), None
+            for _ in range(halvings):
+                y, normal, friction = (part + share * by for part, by in zip((here[0], *here[2:4]), change, strict=True))
+                step.return_to(base)
+                there, spent = _balance(step, y, normal, friction, coefficient, scale), spent + 1
+                if there is not None and there.laws.merit < (1.0 - 0.1 * share) * here.laws.merit:
+                    break
+                share *= 0.5
+            here = there
+    return None, spent
+
+
+def _balance(
+    step: Step, y: FloatArray, normal: FloatArray, friction: FloatArray, coefficient: float, scale: FloatArray
+) -> Balance | None:
+    """Evaluate all equations; None out of the range of a section."""
+    near = step.contacts(y)
+    if near is None:
+        return None
+    normal, friction = step.carried(normal, friction)
+    root = np.sqrt(scale)
+    unit_normal = _unit_force(near.gradients, root, step.reach)
+    unit_friction = np.minimum(_unit_force(near.jacobian, root, step.reach).min(axis=1, initial=np.inf), unit_normal)
+    pressed = normal > _OPENING * unit_normal**2 * near.gaps
+    rubs = pressed & (coefficient > 0.0)
+    tried = friction - (unit_friction**2)[:, None] * near.sliding
+    size, radius = np.linalg.norm(tried, axis=1), coefficient * np.maximum(normal, 0.0)
+    sticks = rubs & (size <= radius)
+    size = np.maximum(size, 1e-300)
+    way = tried / size[:, None]
+    slips = rubs & ~sticks
+    broken = friction - np.where(slips[:, None], radius[:, None] * way, 0.0)
+    residual, tangent, allowed = step.residual(normal, friction)
+    parts = (
+        residual / root,
+        np.where(pressed, near.gaps * unit_normal, normal / unit_normal),
+        (np.where(sticks[:, None], near.sliding * unit_friction[:, None] ** 2, broken) / unit_friction[:, None]).ravel(),
+    )
+    merit = float(np.linalg.norm(np.concatenate(parts)))
+    laws = Laws(pressed, sticks, slips, way, radius / size, broken, root, unit_normal, unit_friction, merit)
+    return Balance(y, near, normal, friction, residual, tangent, allowed, laws)
+
+
+def _converged(step: Step, here: Balance, coefficient: float) -> bool:
+    """Whether balance, gaps, sliding and friction are within their tolerances."""
+    near, laws, normal = here.contacts, here.laws, here.normal
+    force = max(CONE * float(normal.max(initial=0.0)), here.allowed / step.reach)
+    open_gaps = np.where(laws.pressed, np.abs(near.gaps), -near.gaps)
+    return bool(
+        np.linalg.norm(here.residual) <= here.allowed
+        and open_gaps.max(initial=0.0) <= GAP * step.reach
+        and np.abs(near.sliding[laws.sticks]).max(initial=0.0) <= GAP * step.reach
+        and np.abs(laws.broken[~laws.sticks]).max(initial=0.0) <= force
+        and np.abs(normal[~laws.pressed]).max(initial=0.0) <= force
+        and normal.min(initial=0.0) >= -force
+    )
+
+
+def _unit_force(rows: FloatArray, root: FloatArray, reach: float) -> FloatArray:
+    """Force along each row that stores half a joule in the springs alone, shape of the rows without their last axis [N]."""
+    return np.asarray(1.0 / np.maximum(np.linalg.norm(rows / root, axis=-1), _MOTIONLESS * reach / root.max()))
+
+
+def _newton_change(here: Balance, coefficient: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Newton step of coordinates, normal forces and friction."""
+    near, laws, n, root = here.contacts, here.laws, len(here.q_springs), here.laws.root
+    by_normal, by_friction = -here.normal, -here.friction  # those that do not press lose their forces
+    pressed, rubs = np.flatnonzero(laws.pressed), np.flatnonzero(laws.slips | laws.sticks)
+    by_normal[pressed], by_friction[rubs] = 0.0, 0.0
+    lost = by_normal @ near.gradients + np.tensordot(by_friction, near.jacobian)
+    place = n + np.arange(len(pressed))
+    places = n + len(pressed) + np.arange(2 * len(rubs)).reshape(-1, 2)
+    gradients = near.gradients[pressed] / root * laws.unit_normal[pressed, None]
+    jacobian = near.jacobian[rubs] / root * laws.unit_friction[rubs, None, None]
+    matrix = np.zeros((n + len(pressed) + 2 * len(rubs),) * 2)
+    right = np.zeros(len(matrix))
+    matrix[:n, :n], right[:n] = here.tangent / root / root[:, None], (lost - here.residual) / root
+    matrix[:n, place], matrix[place, :n] = -gradients.T, gradients
+    right[place] = -near.gaps[pressed] * laws.unit_normal[pressed]
+    matrix[:n, places.ravel()] = -jacobian.reshape(-1, n).T
+    for one, rows, moves in zip(rubs.tolist(), places, jacobian, strict=True):
+        if laws.sticks[one]:
+            matrix[rows, :n] = moves
+            right[rows] = -near.sliding[one] * laws.unit_friction[one]
+            continue
+        # d lambda_t = mu way d lambda_n + held (1 - way way^T) (d lambda_t - rho d s)
+        way, ratio = laws.way[one], laws.unit_normal[one] / laws.unit_friction[one]
+        turn = laws.held[one] * (np.eye(2) - np.outer(way, way))
+        matrix[np.ix_(rows, rows)] = np.eye(2) - turn
+        matrix[rows, :n] = turn @ moves
+        matrix[rows, place[np.searchsorted(pressed, one)]] = -coefficient * ratio * way
+        right[rows] = -laws.broken[one] / laws.unit_friction[one]
+    try:
+        change = np.linalg.lstsq(matrix, right, rcond=_RANK)[0]
+    except np.linalg.LinAlgError:
+        return None
+    by_normal[pressed] = change[place] * laws.unit_normal[pressed]
+    by_friction[rubs] = change[places] * laws.unit_friction[rubs, None]
+    return change[:n] / root, by_normal, by_friction

@@ -1,0 +1,166 @@
+r"""Quasi-static steps in contact with friction from one equilibrium to the next, and overdamped motion where none is near.
+
+A step is solved from the last state by `softrobots.statics.contact.coulomb`. It is taken if the state found is near, and stable
+against motions that the contacts do not hold; else it is halved. Where even the smallest step is
+not taken, the last state has lost its stability or ceased to exist. Then the robot moves like one whose springs are braked by a
+viscous fluid, :math:`c\, K_0\, \dot y = -r + G^T \lambda_n + T^T \lambda_t`, in implicit steps of time, with the same law
+of friction, until it rests. That motion only lowers the energy, and stops at equilibria alone.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import numpy as np
+
+from softrobots.core.blas_threads import one_blas_thread
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import ParameterError
+from softrobots.environment.gaps import Surroundings
+from softrobots.model.soft_model import SoftModel
+from softrobots.statics.contact.coulomb import Balance, solve_step
+from softrobots.statics.contact.last_state import MARGIN, Given, Sliding
+from softrobots.statics.contact.sliding import SlidingRobot
+from softrobots.statics.equilibrium_result import Equilibrium
+
+FAR = 0.2
+"""Change of the springs that is no small step, in coordinates in which their energy is half the square [rad]."""
+
+_MOST_MOMENTS = 400  # steps of the overdamped motion
+_STRONGEST = 1e6  # brake that is given up at, over the stiffness of the springs
+_STANDS, _PUSH = 1e-8, 1e-3  # change of the springs that is none, and that of a push [rad]
+_NEARLY_AT_REST = 0.02  # change of the springs below which the motion may have arrived
+
+
+class Rest(NamedTuple):
+    """A robot at rest after a step."""
+
+    robot: SlidingRobot
+    """The robot."""
+    found: Balance
+    """Its coordinates and forces."""
+    work: float
+    """Work against friction in the step [J]."""
+    iterations: int
+    """Evaluations."""
+
+    @property
+    def q_springs(self) -> FloatArray:
+        """Elastic coordinates, shape (n_springs,)."""
+        return self.found.q_springs
+
+    @property
+    def sliding(self) -> Sliding:
+        """What friction remembers of it."""
+        return self.robot.after(self.found)
+
+    @property
+    def statuses(self) -> dict[tuple[str, str], str]:
+        """Of each pair of link and obstacle that press: whether they slip, stick or, without friction, are pressed."""
+        pressed = [one for one in self.robot.touches(self.found) if one.strict]
+        return {(one.link, one.obstacle): one.status for one in sorted(pressed, key=lambda one: one.status == "slips")}
+
+    def equilibrium(self) -> Equilibrium:
+        """Return it as a result."""
+        return self.robot.equilibrium(self.found, self.iterations)
+
+
+def settle(given: Given, last: Sliding, start: FloatArray, brake: float = 0.0) -> Rest | None:
+    """Solve one step from elastic coordinates, shape (n_springs,); None if it does not converge to a state that holds."""
+    with one_blas_thread(given.model.n_springs):
+        robot = SlidingRobot(given, last, brake)
+        found, spent = solve_step(robot, start, last.friction)
+        if found is None or not robot.holds(found):
+            return None
+        return Rest(robot, found, robot.work(found), spent)
+
+
+def step(given: Given, last: Rest) -> Rest | None:
+    """Go on to what is given at the next place; None if there is no equilibrium that holds near the last one."""
+    sliding, start = carried_over(given, last)
+    there = settle(given, sliding, start)
+    return None if there is None or change(given.model, there.q_springs, start) > FAR else there
+
+
+def move_to_rest(given: Given, last: Rest) -> Rest | None:
+    """Follow overdamped motion from the last state until it rests; None if it does not.
+
+    Returns:
+        The state, with the work against friction of the whole motion.
+    """
+    model, (sliding, here) = given.model, carried_over(given, last)
+    brake, work = 1.0, 0.0
+    for _ in range(_MOST_MOMENTS):
+        there = settle(given, sliding, here, brake)
+        moved = np.inf if there is None else change(model, there.q_springs, here)
+        if there is None or moved > FAR:
+            brake *= 4.0
+            if brake > _STRONGEST:
+                return None
+            continue
+        work += there.work
+        sliding, here = there.sliding, there.q_springs
+        if moved < _NEARLY_AT_REST:
+            rest = settle(given, sliding, here)
+            if rest is not None and change(model, rest.q_springs, here) < _NEARLY_AT_REST:
+                return rest._replace(work=work + rest.work)
+            if moved < _STANDS:  # on an equilibrium that does not hold: a small push along its softest motion
+                here, brake = here + _PUSH * there.robot.softest(there.found)[1], 1.0
+            brake *= 0.5
+    return None
+
+
+def energy_drop(given: Given, last: Rest, rest: Rest) -> float:
+    """Return the potential energy of the last state at what is given, less that of another one and friction's work [J]."""
+    if not given.load.conservative:
+        return float("nan")
+    sliding, start = carried_over(given, last)
+    before = SlidingRobot(given, sliding)
+    before.contacts(start)
+    return before.energy() - rest.robot.energy() - rest.work
+
+
+def change(model: SoftModel, there: FloatArray, here: FloatArray) -> float:
+    """Return the size of a change of springs, relative to the mean stiffness of the springs."""
+    return float(np.linalg.norm(np.sqrt(model.stiffness / model.stiffness.mean()) * (there - here)))
+
+
+def carried_over(given: Given, last: Rest) -> tuple[Sliding, FloatArray]:
+    """Return what friction remembers and the elastic coordinates in the robot given, which may have grown since.
+
+    What has everted does not move along the tube: each place of the longer robot keeps the strains that it had, measured from
+    the base; what is new at its tip is at rest.
+    """
+    model, before = given.model, last.robot.model
+    if model == before:
+        return last.sliding, last.q_springs
+    springs = last.q_springs if model.n_springs == before.n_springs else grown_springs(model, before, last.q_springs)
+    given_before = last.robot.given
+    joints = model.coordinates.at(given_before.q_motors, springs).joints
+    there = Surroundings(model, given_before.environment).at(model.embed(joints), MARGIN * model.reach)
+    return Sliding(last.sliding.friction, there), springs
+
+
+def grown_springs(model: SoftModel, before: SoftModel, q_springs: FloatArray) -> FloatArray:
+    """Return the elastic coordinates of a robot of sections in the shape of another one, longer or shorter.
+
+    Args:
+        model: The robot.
+        before: The same robot at another length.
+        q_springs: Elastic coordinates of that, shape (n,).
+
+    Raises:
+        ParameterError: If the robots have other elastic coordinates than those of sections, or other motors.
+    """
+    rows, old_rows = model.structure.section_table, before.structure.section_table
+    if model.n_motors != before.n_motors or any(
+        len(table.rest) != 4 * len(table.structure.section_table) for table in (model, before)
+    ):
+        raise ParameterError("model", model, f"of the same coordinates along the path, or of sections alone; was {before!r}")
+    ends, old_ends = (np.concatenate([[0.0], np.cumsum([row.length for row in table])]) for table in (rows, old_rows))
+    springs = np.array(model.rest)
+    for name in rows[0].places:
+        places, old_places = ([row.places[name] for row in table] for table in (rows, old_rows))
+        turned = np.concatenate([[0.0], np.cumsum((q_springs - before.rest)[old_places])])
+        springs[places] += np.diff(np.interp(ends, old_ends, turned))
+    return springs
