@@ -2,15 +2,21 @@
 
 from __future__ import annotations
 
+from itertools import combinations
+
 import numpy as np
 import pinocchio as pin
 import pytest
-from scipy.optimize import minimize
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+from scipy.optimize import fsolve, minimize, minimize_scalar
+from scipy.spatial.transform import Rotation
 
 import softrobots as sr
 from softrobots.environment.capsules import robot_capsules
 from softrobots.environment.environment import Environment
-from softrobots.environment.obstacles import HalfSpace, Sphere
+from softrobots.environment.obstacles import Box, HalfSpace, Sphere
+from tests.support.law_robots import PUSHES, directions, model
 from tests.support.oracles import arm_energy
 
 MOTORS, FORCE = (0.3, 0.6, -0.8), np.array([0.0, 30.0, -80.0])
@@ -81,3 +87,266 @@ def test_torques_balance_with_contact_forces_at_their_points(arm: sr.SoftModel) 
     assert len(found.contacts) == 2
     assert np.abs(torque[arm.spring_indices] - found.spring_torques).max() < found.tolerance
     assert np.abs(torque[arm.motor_indices] - found.motor_torques).max() < rounding + found.tolerance
+
+
+# --- By hand
+
+LINK, HINGE, STIFFNESS, BODY = 0.6, 0.03, 172.71, 0.055  # of the paper's arm, and the radius of its capsules
+
+
+def test_a_stretched_arm_on_a_ceiling_is_two_springs_and_one_multiplier(arm: sr.SoftModel) -> None:
+    """The end of the stretched arm is pushed up against a ceiling: moments about both hinges, and the height of the end.
+
+    `k a1 = f x - R x`, with the lever arms of the end about each hinge; the bent links stay in the plane of the push.
+    """
+    ceiling, push = 0.06 + BODY, np.array([5.0, 0.0, 60.0])
+
+    def equations(unknown: np.ndarray) -> list[float]:
+        first, second, reaction = unknown
+        along = (LINK - HINGE) * np.array([np.cos(first), np.sin(first)])
+        along += HINGE * np.array([np.cos(first), np.sin(first)])
+        last = (LINK - HINGE) * np.array([np.cos(first + second), np.sin(first + second)])
+        end = along + last
+        up = push[2] - reaction
+        moments = [up * arm_[0] - push[0] * arm_[1] for arm_ in (end, last)]
+        return [STIFFNESS * first - moments[0], STIFFNESS * second - moments[1], end[1] + BODY - ceiling]
+
+    first, second, reaction = fsolve(equations, [0.05, 0.05, 30.0], xtol=1e-12)
+    found = sr.solve_equilibrium(arm, (0, 0, 0), push, environment=Environment([HalfSpace((0, 0, -1), -ceiling)]))
+    (contact,) = found.contacts
+    assert np.allclose(found.q_springs, [0.0, first, 0.0, second], atol=1e-10)
+    assert contact.normal_force == pytest.approx(reaction, rel=1e-10)
+    assert np.allclose(contact.force, [0.0, 0.0, -reaction])
+    assert np.allclose(contact.point, [*found.tip_position[:2], ceiling], atol=1e-12)
+    assert np.allclose(contact.point, contact.obstacle_point, atol=1e-12)
+    assert (contact.link, contact.obstacle, contact.status) == ("link_2", "half_space_1", "pressed")
+    assert found.eigenvalues.shape == (3,)  # four springs, less one pressed contact
+    assert found.stability.kind == "stable"
+
+
+@pytest.fixture(scope="module")
+def one_link() -> sr.SoftModel:
+    """One link on two springs."""
+    return sr.load_model(sr.InflatableArm(link_lengths=(LINK,), hinge_offset=HINGE, stiffness=STIFFNESS))
+
+
+def end_of(springs: np.ndarray) -> np.ndarray:
+    """End of one link: turned sideways about z, then up about -y of the turned link."""
+    side, up = springs
+    along = np.array([np.cos(side) * np.cos(up), np.sin(side) * np.cos(up), np.sin(up)])
+    return np.array([HINGE, 0.0, 0.0]) + (LINK - HINGE) * along
+
+
+def slopes_of(springs: np.ndarray) -> np.ndarray:
+    """Derivative of `end_of`."""
+    side, up = springs
+    first = np.array([-np.sin(side) * np.cos(up), np.cos(side) * np.cos(up), 0.0])
+    second = np.array([-np.cos(side) * np.sin(up), -np.sin(side) * np.sin(up), np.cos(up)])
+    return (LINK - HINGE) * np.stack([first, second], axis=1)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_spring_pairs_are_one_of_all_active_sets(one_link: sr.SoftModel, seed: int) -> None:
+    """All subsets of eight walls around the end of a link, each solved as equations; the answer is the lowest that holds.
+
+    Three walls or more do not meet in the two springs; their subsets have no solution.
+    """
+    rng = np.random.default_rng(seed)
+    normals = rng.normal(size=(8, 3)) * [0.3, 1.0, 1.0]
+    normals[:, 0] = -np.abs(normals[:, 0])  # the end is nearer to each wall than the base
+    normals /= np.linalg.norm(normals, axis=1)[:, None]
+    offsets = normals @ end_of(np.zeros(2)) - BODY - rng.uniform(0.01, 0.15, 8)
+    force = rng.uniform(-120.0, 120.0, 3)
+    walls = [HalfSpace(tuple(normal), offset) for normal, offset in zip(normals, offsets, strict=True)]
+
+    def energy(y: np.ndarray) -> float:
+        return 0.5 * STIFFNESS * float(y @ y) - float(force @ end_of(y))
+
+    candidates = []
+    for held in [held for size in range(3) for held in combinations(range(8), size)]:
+        n, d = normals[list(held)], offsets[list(held)]
+
+        def equations(x: np.ndarray, n: np.ndarray = n, d: np.ndarray = d) -> np.ndarray:
+            y, pressed = x[:2], x[2:]
+            pull = STIFFNESS * y - slopes_of(y).T @ (force + pressed @ n)
+            return np.concatenate([pull / STIFFNESS, n @ end_of(y) - d - BODY])
+
+        x, _, flag, _ = fsolve(equations, np.zeros(2 + len(held)), xtol=1e-13, full_output=True)
+        gaps = normals @ end_of(x[:2]) - offsets - BODY
+        if flag == 1 and np.abs(equations(x)).max() < 1e-10 and gaps.min() > -1e-9 and x[2:].min(initial=0.0) > -1e-9:
+            candidates.append((energy(x[:2]), held, x))
+    best = min(candidates, key=lambda one: one[0])
+    found = sr.solve_equilibrium(one_link, (0, 0), force, environment=Environment(walls))
+    pressed = {contact.obstacle: contact.normal_force for contact in found.contacts if contact.strict}
+    assert found.stable
+    assert np.abs(found.q_springs - best[2][:2]).max() < 1e-8
+    assert pressed == pytest.approx({f"half_space_{1 + i}": f for i, f in zip(best[1], best[2][2:], strict=True)}, rel=1e-7)
+
+
+def test_three_walls_on_one_end_share_the_load_by_least_norm(one_link: sr.SoftModel) -> None:
+    """Three walls through one point and two springs: forces are not unique, and those of least norm are told as such."""
+    end, push = end_of(np.zeros(2)), np.array([0.0, 40.0, 70.0])
+    normals = np.array([[-0.6, -0.8, 0.0], [-0.6, 0.0, -0.8], [-0.28, -0.576, -0.768]])
+    walls = [HalfSpace(tuple(normal), normal @ end - BODY) for normal in normals]
+    found = sr.solve_equilibrium(one_link, (0, 0), push, environment=Environment(walls))
+    forces = [contact.normal_force for contact in found.contacts]
+    assert np.allclose(found.q_springs, 0.0, atol=1e-12)
+    slopes = slopes_of(np.zeros(2))
+    assert np.allclose(forces, np.linalg.pinv(-(normals @ slopes).T) @ (slopes.T @ push), rtol=1e-9)
+    assert not found.contact_forces_unique
+    assert found.stable
+    assert len(found.eigenvalues) == 0
+
+
+def test_a_touch_without_force_is_told(one_link: sr.SoftModel) -> None:
+    """A wall at the relaxed end is touched, not pressed; it does not count in the certificate."""
+    wall = Environment([HalfSpace((0, 0, 1), end_of(np.zeros(2))[2] - BODY)])
+    found = sr.solve_equilibrium(one_link, (0, 0), environment=wall)
+    (contact,) = [one for one in found.contacts if one.gap <= 1e-12 and one.normal_force == 0.0][:1]
+    assert (contact.status, contact.strict, found.stable) == ("touching", False, True)
+    assert found.contact_gradients.shape == (0, 2)
+
+
+@pytest.mark.parametrize("push", [40.0, 120.0])
+def test_an_arm_slides_off_the_ridge_of_a_ball(one_link: sr.SoftModel, push: float) -> None:
+    """Pushed down on a small ball straight below: on its top the link is at a saddle if `R l^2 / d > k`, and leaves it.
+
+    `R` is the reaction, `l` its lever, `d` the distance of the core from the centre of the ball. Below that the link stays.
+    """
+    lever, ball, sag = 0.4, 0.02, 1e-3
+    centre = (HINGE + lever, 0.0, -BODY - ball + sag)
+    reaction = (push * (LINK - HINGE) + STIFFNESS * sag / lever) / lever
+    stays = reaction * lever**2 / (ball + BODY) < STIFFNESS
+    found = sr.solve_equilibrium(one_link, (0, 0), (0, 0, -push), environment=Environment([Sphere(ball, centre)]))
+    assert stays == (push < 100.0)
+    assert stays == bool(found.contacts and abs(found.q_springs[0]) < 1e-9)
+    assert stays or found.q_springs[1] < -0.1
+    assert found.stable
+    if stays:
+        assert found.contacts[0].normal_force == pytest.approx(reaction, rel=1e-3)  # the point is 0.2 mm off the top
+
+
+def test_both_ends_of_a_link_lie_on_a_floor(arm: sr.SoftModel) -> None:
+    """A link that lies flat on a floor presses both ends of its capsule; both forces follow from force and moment."""
+    floor = Environment([HalfSpace((0, 0, 1), -BODY)])
+    found = sr.solve_equilibrium(arm, (0, 0, 0), gravity=sr.EARTH_GRAVITY, environment=floor)
+    assert np.allclose(found.q_springs, 0.0, atol=1e-12)
+    assert found.stable
+    assert all(abs(contact.gap) < 1e-12 for contact in found.contacts)
+    free = sr.solve_equilibrium(arm, (0, 0, 0), gravity=sr.EARTH_GRAVITY)
+    assert free.tip_position[2] < -1e-3
+
+
+def box_distance(size: np.ndarray, centre: np.ndarray, rotation: np.ndarray, a: np.ndarray, b: np.ndarray) -> float:
+    """Distance of a segment from a box: least over the segment of a convex function."""
+
+    def distance(share: float) -> float:
+        local = rotation.T @ (a + share * (b - a) - centre)
+        return float(np.linalg.norm(local - np.clip(local, -0.5 * size, 0.5 * size)))
+
+    inside = minimize_scalar(distance, bounds=(0.0, 1.0), method="bounded", options={"xatol": 1e-10}).fun
+    return min(inside, distance(0.0), distance(1.0))
+
+
+UPRIGHT = Rotation.align_vectors([[0, 0, 1]], [[1, 1, 1]])[0].as_matrix()  # stands on a corner
+
+
+@pytest.mark.parametrize(
+    ("place", "rotation", "push"),
+    [
+        ((0.45, 0.16, -0.1), np.eye(3), (0, 20, -120)),  # an edge, from the side
+        ((0.55, -0.12, -0.12), np.eye(3), (0, 20, -120)),  # an edge and the end of the link
+        ((0.66, 0.1, -0.2), np.eye(3), (0, 20, -120)),  # the end of the link on a face
+        ((0.45, 0.003, -0.24), UPRIGHT, (0, 1, -30)),  # a corner
+    ],
+)
+def test_links_lean_on_faces_edges_and_corners_of_a_box(
+    one_link: sr.SoftModel, place: tuple, rotation: np.ndarray, push: tuple
+) -> None:
+    """SLSQP on the closed energy and the distance of the test; it differentiates by differences."""
+    size = np.array([0.2, 0.2, 0.2])
+    found = sr.solve_equilibrium(one_link, (0, 0), push, environment=Environment([Box(tuple(size), place, rotation)]))
+
+    def gap(y: np.ndarray) -> float:
+        return box_distance(size, np.array(place), rotation, np.array([HINGE, 0.0, 0.0]), end_of(y)) - BODY
+
+    best = minimize(
+        lambda y: 0.5 * STIFFNESS * float(y @ y) - float(push @ end_of(y)),
+        found.q_springs + 1e-2,
+        method="SLSQP",
+        constraints={"type": "ineq", "fun": gap},
+        options={"ftol": 1e-13, "maxiter": 200},
+    )
+    assert [contact.strict for contact in found.contacts] == [True]
+    assert found.stable
+    assert np.abs(found.q_springs - best.x).max() < 1e-5
+    assert abs(gap(found.q_springs)) < 1e-9
+
+
+def test_work_of_a_growing_force_is_stored_while_it_slides(arm: sr.SoftModel) -> None:
+    """On frictionless obstacles the work of a force from 0.5 to 1 times its size is the change of the springs' energy.
+
+    Gauss and Legendre on eight forces, at each of which the same contacts are pressed.
+    """
+    environment = Environment(WALLS["sphere"])
+
+    def at(share: float) -> sr.Equilibrium:
+        return sr.solve_equilibrium(arm, MOTORS, share * FORCE, environment=environment)
+
+    ends = [at(0.5), at(1.0)]
+    places, weights = np.polynomial.legendre.leggauss(8)
+    between = [at(0.75 + 0.25 * place) for place in places]
+    assert {len(one.contacts) for one in (*ends, *between)} == {1}
+    moved = sum(0.25 * weight * FORCE @ one.tip_position for weight, one in zip(weights, between, strict=True))
+    work = FORCE @ ends[1].tip_position - 0.5 * FORCE @ ends[0].tip_position - moved
+    stored = [0.5 * STIFFNESS * one.q_springs @ one.q_springs for one in ends]
+    assert work == pytest.approx(stored[1] - stored[0], rel=1e-9)
+
+
+# --- Whatever robot
+
+spheres = st.tuples(st.floats(0.05, 0.3), st.floats(0.3, 1.0), directions, st.floats(-0.3, 0.6))
+
+
+@settings(max_examples=25, deadline=None)
+@given(
+    kind=st.sampled_from(["arm", "limp", "slack", "two_hinges", "pulled", "tendons", "helix", "helix_lumped"]),
+    obstacles=st.lists(spheres, min_size=1, max_size=3),
+    direction=directions,
+    size=st.floats(0.0, 0.5),
+)
+def test_nothing_penetrates_and_nothing_pulls(kind: str, obstacles: list, direction: np.ndarray, size: float) -> None:
+    """Random balls near random robots of every kind: gaps, signs and balance hold, or the failure is named."""
+    robot = model(kind)
+    motors = robot.relaxed_motors
+    free = sr.solve_equilibrium(robot, motors)
+    balls = []
+    for radius, along, side, apart in obstacles:
+        centre = along * free.tip_position + np.array(side) * (radius * robot.reach + apart * robot.reach)
+        balls.append(Sphere(radius * robot.reach, tuple(centre)))
+    assume(distances(robot, balls, robot.configuration(motors)).min() > 0.0)
+    try:
+        found = sr.solve_equilibrium(robot, motors, size * PUSHES[kind] * direction, environment=Environment(balls))
+    except sr.EquilibriumNotFound as error:
+        assert np.isfinite(error.residual)
+        return
+    assert distances(robot, balls, found.q).min() > -1e-9 * robot.reach
+    assert found.residual <= found.tolerance
+    for contact in found.contacts:
+        assert contact.normal_force >= 0.0
+        assert abs(contact.normal_force * contact.gap) <= 1e-9 * robot.reach * contact.normal_force
+        assert np.allclose(contact.point - contact.obstacle_point, contact.gap * contact.normal, atol=1e-12)
+
+
+# --- Refusals
+
+
+def test_what_contact_cannot_have_is_refused_by_name(arm: sr.SoftModel) -> None:
+    floor = Environment([HalfSpace((0, 0, 1), -0.1)])
+    with pytest.raises(sr.ParameterError, match="'newton' in contact"):
+        sr.solve_equilibrium(arm, MOTORS, FORCE, environment=floor, method="fixed_point")
+    with pytest.raises(sr.ParameterError, match="environment"):
+        sr.solve_equilibrium(arm, MOTORS, FORCE, environment=[HalfSpace((0, 0, 1))])
+    block = Environment([Box((0.05, 0.05, 0.05), (0.03, 0.0, 0.07))])
+    with pytest.raises(sr.EquilibriumNotFound, match=r"'link_1_root' is 0\.01 m inside of 'box_1', wherever the springs are"):
+        sr.solve_equilibrium(arm, (0, 0, 0), environment=block)

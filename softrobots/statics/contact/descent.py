@@ -143,12 +143,16 @@ class ContactSearch:
         curvature, motion = softest_motion(state.tangent, self._stiffness, touch, self._reach, allowed)
         if curvature > -POSITIVE or not math.isfinite(curvature):
             return curvature > POSITIVE, None
-        motion = motion * (_ESCAPE / norm(motion))
+        motion = motion / norm(motion)
         if motion[np.argmax(np.abs(motion))] < 0.0:
             motion = -motion
+        gaps = touch.gaps.values
         for wanted in (motion, -motion):
-            step = nearest_step(wanted, touch.gaps.values, touch.rows, self._stiffness)
-            if step is not None and float(step @ state.tangent @ step) < 0.0 and norm(step) > 0.1 * norm(wanted):
+            closing = np.where(gaps > TOUCHING * self._reach, -(touch.rows @ wanted), 0.0)
+            longest = float((gaps[closing > 0.0] / closing[closing > 0.0]).min(initial=np.inf))
+            size = min(_ESCAPE, 0.5 * longest)
+            step = nearest_step(size * wanted, gaps, touch.rows, self._stiffness)
+            if step is not None and float(step @ state.tangent @ step) < 0.0 and norm(step) > 0.1 * size:
                 return False, Step(step, touch.forces, False)
         return False, None
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from softrobots.core.checks import FloatArray
 from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.contact.descent import BALANCED, ContactSearch, Near
-from softrobots.statics.contact.touch import ForceTable, resting_forces
+from softrobots.statics.contact.touch import TOUCHING, ForceTable, resting_forces
 from softrobots.statics.elastic_state import ElasticProblem, ElasticState
 from softrobots.statics.stability import is_stable
 
@@ -42,10 +42,11 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
 
 def _of_least_norm(search: ContactSearch, found: Near) -> Near | None:
     """The equilibrium with the contact forces of least norm; None where the forces are unique."""
-    rows = found.touch.rows[found.touch.forces > 0.0]
-    if len(rows) == rows.shape[1] - null_space(rows).shape[1]:
+    reach = search.problem.model.reach
+    rows = found.touch.rows[found.touch.gaps.values <= TOUCHING * reach]
+    if len(rows) < 2 or len(rows) == rows.shape[1] - null_space(rows).shape[1]:
         return None
-    forces = resting_forces(found.touch, found.load, search.problem.model.reach)
+    forces = resting_forces(found.touch, found.load, reach)
     least = search.near(found.state.q_springs, ForceTable(found.touch.gaps.keys, forces))
     return least if least is not None and least.error <= max(BALANCED, found.error) else None
 
