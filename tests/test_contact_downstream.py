@@ -17,7 +17,10 @@ from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Surroundings
 from softrobots.environment.obstacles import Box, HalfSpace, Sphere
 from softrobots.statics.contact.contact_sensitivity import ContactSensitivity
+from softrobots.statics.contact.pressed_gaps import motor_slopes, pressed_gaps
+from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.sensitivity import held_motion
 from tests.support.law_robots import triples
 from tests.support.laws import law
 from tests.support.rods import cantilever_frequencies
@@ -69,6 +72,9 @@ def test_derivatives_in_contact_are_those_of_solved_equilibria(name: str) -> Non
     pairs = [(jacobian, by_motors[:3]), (slopes.by_motors, by_motors[3 : 3 + count])]
     pairs += [(sr.compliance(arm, found)[:3, :3], by_force[:3]), (slopes.by_wrench[:, :3], by_force[3 : 3 + count])]
     pairs += [(jacobian.T, by_force[3 + count :])]  # Maxwell-Betti: the constraints do no work
+    state = elastic_state(arm, MOTORS, found.q_springs, found.load)
+    _, through = held_motion(arm, state.tangent, state.load.coupling, pressed_gaps(state))
+    pairs += [(motor_slopes(state, found.load)[0] + through, by_motors[3 + count :])]
     for closed, differences in pairs:
         assert np.abs(closed - differences).max() < 1e-7 * np.abs(differences).max()
     assert slopes.contacts == found.contacts
@@ -302,6 +308,28 @@ def test_a_saved_equilibrium_comes_back_with_its_contacts(name: str, ending: str
     kept = sr.load_result(sr.save_result(modes, tmp_path / f"modes{ending}"))
     assert np.allclose(kept.frequencies, modes.frequencies, rtol=1e-12)
     assert kept.eigenvalues.shape == (2 * len(modes.frequencies),)
+
+
+def test_other_results_come_back_with_their_obstacles(tmp_path: Path) -> None:
+    held = leaning("wall")
+    arm, options = held.model, {"gravity": sr.EARTH_GRAVITY, "environment": held.environment}
+    normal = np.array(WALL.normal) / np.linalg.norm(WALL.normal)
+    path = sr.follow_trajectory(arm, held.tip_position + [[0.0], [0.05]] * normal, FORCE, q_motors0=MOTORS, **options)
+    results = {
+        "ik": sr.solve_ik(arm, held.tip_position, FORCE, q_motors0=MOTORS, **options),
+        "path": path,
+        "estimate": sr.estimate_load(arm, MOTORS, held.motor_torques, **options, torque_std=0.1, motor_angle_std=0.01),
+    }
+    for name, result in results.items():
+        again = sr.load_result(sr.save_result(result, tmp_path / f"{name}.npz"))
+        one, other = (found.equilibria[0] if name == "path" else found.equilibrium for found in (again, result))
+        assert one.environment == held.environment
+        assert np.allclose(normal_forces(one), normal_forces(other), rtol=1e-9)
+    again = sr.load_result(tmp_path / "estimate.npz")
+    assert np.allclose(again.covariance, results["estimate"].covariance, rtol=1e-9)
+    again = sr.load_result(tmp_path / "path.npz")
+    assert list(again.contact_forces) == list(path.contact_forces) == ["half_space_1"]
+    assert np.allclose(again.contact_forces["half_space_1"], path.contact_forces["half_space_1"], rtol=1e-9)
 
 
 def test_a_file_with_a_robot_inside_of_an_obstacle_is_refused(tmp_path: Path) -> None:

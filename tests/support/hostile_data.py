@@ -305,7 +305,9 @@ def results() -> dict[str, Any]:
         ),
         "vibration_modes": sr.vibration_modes(model, held, servo_stiffness=(900.0, 800.0, 700.0)),
         "equilibrium": held,
-        "ik_solution": sr.solve_ik(model, (0.9, 0.3, 0.2), (0, 0, -5)),
+        "ik_solution": sr.solve_ik(
+            model, (0.9, 0.3, 0.2), (0, 0, -5), environment=sr.Environment([sr.HalfSpace((0, 0, 1), -0.3)])
+        ),
         "imposed_displacement": sr.solve_imposed_displacement(model, (0.3, 0.6, -0.8), 0.01, direction=(0, 0, -1)),
         "load_estimate": sr.estimate_load(model, held.q_motors, held.motor_torques, torque_std=0.1),
         "trajectory": sr.follow_trajectory(wristed, path.targets, (0, 0, -5), times=path.times),
