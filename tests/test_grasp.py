@@ -250,6 +250,21 @@ def test_a_grasp_is_the_same_wherever_it_is_and_in_any_units(seed: int, count: i
     assert more.largest_force >= held.force - 1e-8 * squeeze  # more friction never holds less
 
 
+@pytest.mark.parametrize("friction", [1e-6, 1e-3, 30.0])
+def test_bounds_meet_whatever_the_sizes(friction: float) -> None:
+    """Contacts in one point, on a line, in a plane; lengths and forces over many decades: within 1e-6 of the squeeze."""
+    rng = np.random.default_rng(6)
+    for trial in range(8):
+        count = int(rng.integers(1, 8))
+        points, ways = 10.0 ** rng.uniform(-6, 3) * rng.normal(size=(count, 3)), rng.normal(size=(count, 3))
+        points = [points, 0.0 * points + points[0], np.outer(points[:, 0], points[0]), points * (1.0, 1.0, 0.0)][trial % 4]
+        pressed = 10.0 ** rng.uniform(-9, 6, count) if trial > 3 else np.ones(count)
+        contacts = [touch(p, way, f * way / np.linalg.norm(way)) for p, way, f in zip(points, ways, pressed, strict=True)]
+        closure, pull = sr.is_force_closure(contacts, friction), sr.pull_out_force(contacts, friction, rng.normal(size=3))
+        assert 0.0 <= closure.margin <= closure.largest_margin <= closure.margin + 1e-6
+        assert 0.0 <= pull.force <= pull.largest_force <= pull.force + 1e-6 * pressed.sum()
+
+
 def test_bad_grasps_are_refused_by_name() -> None:
     good = ring(3)
     refused = [

@@ -36,9 +36,8 @@ from softrobots.core.checks import FloatArray, finite_array, one_each, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.statics.contact.cone_program import CLOSE, ConeProgram
 
-IntArray = NDArray[np.intp]
-
 _RANK = 1e-9  # of the largest singular value
+_OUTSIDE = 0.1 * CLOSE  # of the sum of the normal forces: what the friction that is told may lie outside of a cone
 _ON_CONE = 1e-6  # of the normal force: what the friction of a contact may lie outside by, and slips from
 
 
@@ -122,20 +121,18 @@ def is_force_closure(contacts: Any, friction: Any, *, plane: Any = None) -> Forc
     forces = np.hstack([squeezes, np.zeros((variables, 1))])
     margin = np.zeros((count, unknowns))
     margin[:, -1] = 1.0
-    normal, rough = forces[:count], grasp.friction > 0.0
+    normal = forces[:count]
 
     def inside(found: FloatArray) -> tuple[float, FloatArray]:
         """The squeeze of an answer, with the margin that it has."""
-        rubbing = np.divide(grasp.rubbing(forces @ found), grasp.friction, out=np.zeros(count), where=rough)
-        return float(np.min(normal @ found - rubbing)), forces @ found
+        return float(np.min(normal @ found - grasp.rubbing(forces @ found))), forces @ found
 
     sides = np.vstack([normal.sum(axis=0), margin - normal])
     limits = np.append(float(count), np.zeros(count))
     rubs, start = grasp.tangents @ forces, np.zeros((count, 2))
-    cones = ConeProgram(rubs, start, grasp.friction[:, np.newaxis] * (normal - margin), np.zeros(count), sides, limits)
+    cones = ConeProgram(rubs, start, normal - margin, np.zeros(count), sides, limits)
     least, squeeze, most = cones.largest(np.eye(unknowns)[-1], inside)
-    closed = rank == wrenches and least > CLOSE
-    return ForceClosure(closed, rank, least, most, read_only(grasp.forces(squeeze)))
+    return ForceClosure(rank == wrenches and least > CLOSE, rank, least, most, read_only(grasp.forces(squeeze)))
 
 
 def pull_out_force(
@@ -172,20 +169,22 @@ def pull_out_force(
     refuse_where("largest_normal_force", limits, beyond, "at least what the contact presses with now, {:.6g} N", now[:count])
     limits = np.maximum(limits, now[:count])
     unit = float(limits.sum())
-    if unit == 0.0:
+    if not np.any(limits if largest_normal_force is not None else grasp.friction * limits):
         return PullOut(0.0, 0.0, read_only(grasp.forces(now)), (True,) * count)
     at = grasp.centre if point is None else finite_array("point", point, (3,), "m")
     first = count if largest_normal_force is None else 0  # of the components that may change
-    pull = np.append(way, np.cross(at - grasp.centre, way) / grasp.size)
+    # forces by friction alone are smaller than the normal forces by the mean coefficient
+    share = float(grasp.friction @ limits) / unit if first else 1.0
+    pull = share * np.append(way, np.cross(at - grasp.centre, way) / grasp.size)
     balanced = _rank_and_null_space(np.column_stack([grasp.matrix[:, first:], pull]))[1]
     changes = np.vstack([np.zeros((first, balanced.shape[1])), balanced[:-1]])
     rubs, start = grasp.tangents @ changes, grasp.tangents @ now / unit
-    room, room_now = grasp.friction[:, np.newaxis] * changes[:count], (grasp.friction * now[:count] + excess) / unit
+    room, room_now = changes[:count], (now[:count] + excess) / unit
 
     def inside(found: FloatArray) -> tuple[float, FloatArray]:
         """An answer on its way from the forces now, as far as all cones are kept."""
         rub, more = rubs @ found, room @ found
-        leaves = np.linalg.norm(start + rub, axis=1) > room_now + more
+        leaves = np.linalg.norm(start + rub, axis=1) > room_now + more + _OUTSIDE
         # the share of the way at which the square of the friction reaches that of its room
         square, slope = np.sum(rub**2, axis=1) - more**2, np.sum(start * rub, axis=1) - room_now * more
         spare = np.maximum(room_now**2 - np.sum(start**2, axis=1), 0.0)
@@ -197,19 +196,22 @@ def pull_out_force(
     sides = np.vstack([-changes[:count], changes[:count]])
     cones = ConeProgram(rubs, start, room, room_now, sides, np.append(now[:count], limits - now[:count]) / unit)
     least, held, most = cones.largest(balanced[-1], inside)
-    slips = grasp.rubbing(held) >= grasp.friction * held[:count] * (1.0 - _ON_CONE)
-    return PullOut(unit * least, unit * most, read_only(grasp.forces(held)), tuple(slips.tolist()))
+    slips = grasp.rubbing(held) >= held[:count] * (1.0 - _ON_CONE)
+    return PullOut(share * unit * least, share * unit * most, read_only(grasp.forces(held)), tuple(slips.tolist()))
 
 
 class _Grasp(NamedTuple):
-    """Contacts with friction; their forces are components along all normals, then along the tangents of those with friction."""
+    """Contacts with friction, their forces as components along all normals, then along the tangents of those with friction.
+
+    Components along tangents are friction over its coefficient, so that the cones are round: they are within the normal one.
+    """
 
     directions: FloatArray
-    """Direction of each component, into the object or along it, shape (m, 3)."""
-    owners: IntArray
+    """Force of each component: a unit into the object, or the coefficient along it, shape (m, 3)."""
+    owners: NDArray[np.intp]
     """Contact of each component, shape (m,)."""
     tangents: FloatArray
-    """Share of each component in the friction of each contact, shape (k, 2, m)."""
+    """Components along the tangents of each contact, shape (k, 2, m)."""
     friction: FloatArray
     """Coefficient of each contact, shape (k,)."""
     centre: FloatArray
@@ -234,21 +236,20 @@ class _Grasp(NamedTuple):
         else:
             across = unit_vector("plane", plane)
             out = normals @ across
-            refuse_where(
-                "plane", out, np.abs(out) > _ON_CONE, "perpendicular to the normal of every contact; the cosine is {:.3g}", out
-            )
+            refuse_where("plane", out, np.abs(out) > _ON_CONE, "perpendicular to every normal; a cosine is {:.3g}", out)
             first = np.cross(across, normals)
         first /= np.linalg.norm(first, axis=1, keepdims=True)
         tangents = (first, np.cross(normals, first)) if plane is None else (first,)
         rough = np.flatnonzero(coefficients)
-        directions = np.vstack([normals, *(tangent[rough] for tangent in tangents)])
+        directions = np.vstack([normals, *(coefficients[rough, np.newaxis] * tangent[rough] for tangent in tangents)])
         owners = np.concatenate([np.arange(count), *(rough for _ in tangents)])
         shares = np.zeros((count, 2, len(owners)))
         for axis in range(len(tangents)):
             columns = count + axis * len(rough) + np.arange(len(rough))
             shares[rough, axis, columns] = 1.0
         centre = points.sum(axis=0) / max(count, 1)
-        size = float(np.linalg.norm(points - centre)) / max(count, 1) ** 0.5 or 1.0
+        size = float(np.linalg.norm(points - centre)) / max(count, 1) ** 0.5
+        size = size if size > _RANK * np.max(np.abs(points), initial=0.0) else 1.0  # all in one point
         moments = np.cross(points[owners] - centre, directions) / size
         wrenches = np.hstack([directions, moments]).T
         if plane is not None:
@@ -256,22 +257,22 @@ class _Grasp(NamedTuple):
         return cls(directions, owners, shares, coefficients, centre, size, wrenches)
 
     def components(self, contacts: Any) -> tuple[FloatArray, FloatArray]:
-        """Components of the forces that contacts have now, and by how much the friction of each is beyond its cone [N]."""
-        forces = -_vectors(contacts, "force", "N")
-        found = np.sum(self.directions * forces[self.owners], axis=1)
-        count = len(self.friction)
-        pressed = found[:count]
+        """Components of the forces that contacts have now, and how far each contact is beyond its cone [N]."""
+        forces, normals = -_vectors(contacts, "force", "N"), self.directions[: len(self.friction)]
+        pressed = np.sum(normals * forces, axis=1)
         rounding = _ON_CONE * np.max(np.abs(pressed), initial=0.0)
         refuse_where("contacts", pressed, pressed < -rounding, "pressing on the object")
-        np.maximum(pressed, 0.0, out=pressed)
-        rubbing = np.linalg.norm(forces - pressed[:, np.newaxis] * self.directions[:count], axis=1)
-        excess = rubbing - self.friction * pressed
-        needed = np.divide(rubbing, pressed, out=np.full(count, np.inf), where=pressed > 0.0)
-        refuse_where("friction", self.friction, excess > rounding, "at least {:.6g}, by the forces of the contacts", needed)
-        return found, np.maximum(excess, 0.0)
+        rubbing = np.linalg.norm(forces - pressed[:, np.newaxis] * normals, axis=1)
+        pressed = np.maximum(pressed, 0.0)
+        needed = np.divide(rubbing, pressed, out=np.full(len(pressed), np.inf), where=pressed > 0.0)
+        beyond = rubbing > self.friction * pressed + rounding
+        refuse_where("friction", self.friction, beyond, "at least {:.6g}, by the forces of the contacts", needed)
+        found = np.sum(self.directions * forces[self.owners], axis=1) / np.sum(self.directions**2, axis=1)
+        found[: len(pressed)] = pressed
+        return found, np.maximum(self.rubbing(found) - pressed, 0.0)
 
     def rubbing(self, components: FloatArray) -> FloatArray:
-        """Friction of each contact, shape (k,)."""
+        """Friction over its coefficient, shape (k,)."""
         return np.asarray(np.linalg.norm(self.tangents @ components, axis=1))
 
     def forces(self, components: FloatArray) -> FloatArray:
@@ -282,10 +283,11 @@ class _Grasp(NamedTuple):
 
 
 def _rank_and_null_space(matrix: FloatArray) -> tuple[int, FloatArray]:
-    """Rank of a matrix, and an orthonormal base of what it maps to zero, in columns."""
-    _, values, rows = np.linalg.svd(matrix)
+    """Rank of a matrix, by the directions of its columns, and an orthonormal base of what it maps to zero, in columns."""
+    lengths = np.linalg.norm(matrix, axis=0)
+    values = np.linalg.svd(matrix / np.where(lengths > 0.0, lengths, 1.0), compute_uv=False)
     rank = int(np.sum(values > _RANK * np.max(values, initial=0.0)))
-    return rank, rows[rank:].T
+    return rank, np.linalg.svd(matrix)[2][rank:].T
 
 
 def _vectors(contacts: Any, name: str, unit: str) -> FloatArray:
