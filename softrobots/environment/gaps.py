@@ -187,16 +187,17 @@ class Gaps:
         bent, place = curvatures.nonzero()
         if not len(bent):
             return
-        found.append(self._rows(rows[bent], directions[bent, place], points[bent], 0.0))
-        weights.append(forces[bent] * curvatures[bent, place])
-        spans = self.places.spans[self.capsules[rows]]
+        spans = self.places.spans.take(self.capsules.take(rows), 0)
         parts = curvatures * (directions @ spans[:, :, None])[:, :, 0]
-        pulls = (parts[:, :, None] * directions).sum(axis=1)  # H t
-        bend = (pulls * spans).sum(axis=1)
-        slides = ((self.features[rows] == INSIDE) & (bend > 0.0)).nonzero()[0]
-        couples = cross(spans, normals)[slides]
-        found.append(self._rows(rows[slides], pulls[slides], points[slides], couples))
-        weights.append(-forces[slides] / bend[slides])
+        pulls = np.einsum("ij,ijk->ik", parts, directions)  # H t
+        bend = np.einsum("ij,ij->i", pulls, spans)
+        slides = ((self.features.take(rows) == INSIDE) & (bend > 0.0)).nonzero()[0]
+        couples = np.zeros((len(bent) + len(slides), 3))
+        couples[len(bent) :] = cross(spans.take(slides, 0), normals.take(slides, 0))
+        which_rows = np.concatenate([bent, slides])
+        along = np.concatenate([directions[bent, place], pulls.take(slides, 0)])
+        found.append(self._rows(rows.take(which_rows), along, points.take(which_rows, 0), couples))
+        weights.append(np.concatenate([forces[bent] * curvatures[bent, place], -forces[slides] / bend[slides]]))
 
     def _curved_by_itself(self, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
         """Append the terms of candidates of the robot with itself."""
