@@ -10,7 +10,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
 from softrobots.core.progress import with_progress
-from studies.benchmark import arm_jobs, gradient_jobs, motion_jobs, motor_jobs, rod_jobs, tendon_jobs
+from studies.benchmark import arm_jobs, contact_jobs, gradient_jobs, motion_jobs, motor_jobs, rod_jobs, tendon_jobs
 from studies.benchmark.comparison import Outcome, Settings, figure
 from studies.benchmark.processes import bytes_per_case, first_answer
 from studies.benchmark.results import AT_MOST, Results
@@ -55,6 +55,7 @@ JOBS: Mapping[str, Callable[[Settings], Outcome]] = {
     "motion": motion_jobs.motion,
     "tendons": tendon_jobs.tendons,
     "gradients": gradient_jobs.gradients,
+    "contact": contact_jobs.contact,
 }
 """The jobs."""
 
