@@ -362,7 +362,7 @@ def test_a_result_names_no_other_file(tmp_path: Path) -> None:
 # --- Refusals
 
 
-def test_what_cannot_take_obstacles_says_so() -> None:
+def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
     found = leaning("wall")
     refused: dict[str, Any] = {
         "linear model": lambda: sr.linearize(found.model, found),
@@ -372,6 +372,15 @@ def test_what_cannot_take_obstacles_says_so() -> None:
     for words, call in refused.items():
         with pytest.raises(sr.ParameterError, match=f"{words}.*takes no obstacles"):
             call()
+    (rubs,) = sr.follow_contact(
+        found.model, MOTORS, FORCE, gravity=sr.EARTH_GRAVITY, environment=found.environment, friction=0.3, parameters=[0.0]
+    ).equilibria
+    assert {contact.status for contact in rubs.contacts} <= {"sticks", "slips"}
+    for call in (sr.compliance, sr.elastostatic_jacobian, sr.contact_sensitivity, sr.vibration_modes):
+        with pytest.raises(sr.ParameterError, match="one whose contacts have no friction"):
+            call(found.model, rubs)
+    with pytest.raises(sr.ParameterError, match="a ContactPath is saved with its friction"):
+        sr.save_result(rubs, tmp_path / "rubs.npz")
     options = {"environment": found.environment}
     with pytest.raises(sr.ParameterError, match="method"):
         sr.solve_ik(found.model, (0.9, 0.3, 0.2), method="fixed_point", **options)

@@ -12,7 +12,6 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, increasing, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
@@ -24,6 +23,7 @@ from softrobots.model.friction_coordinates import memory_of, remembering
 from softrobots.model.loader import load_again, load_arguments
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
+from softrobots.statics.contact.pressed_gaps import check_no_rubbing
 from softrobots.statics.contact.touch import TOUCHING
 from softrobots.statics.displacement_control import DisplacementControl, Probe
 from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
@@ -35,6 +35,7 @@ from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
 from softrobots.statics.load_estimation import LoadEstimate, estimate_at, packed_estimate
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_goal import Goal, checked_orientation
+from softrobots.statics.tip_path.csv_columns import trajectory_table
 from softrobots.statics.trajectory import Trajectory
 from softrobots.statics.workspace import FIELDS, Workspace, workspace_at
 from softrobots.statics.workspace_map import WorkspaceMap, packed, unpacked
@@ -76,6 +77,8 @@ def _pack_rows(equilibria: tuple[Equilibrium, ...], *, one_load: bool = True) ->
     first = equilibria[0]
     if one_load and any(not e.load.same_as(first.load) for e in equilibria):
         raise ParameterError("result", first.model, "equilibria under one load; these have several")
+    for equilibrium in equilibria:
+        check_no_rubbing(equilibrium, "its file (a ContactPath is saved with its friction)")
     columns = {name: [getattr(equilibrium, name) for equilibrium in equilibria] for name in _COLUMNS}
     if first.model.structure.friction is not None:
         memories = [memory_of(equilibrium.model)._asdict() for equilibrium in equilibria]
@@ -201,26 +204,6 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
     )
 
 
-def _table(trajectory: Trajectory) -> dict[str, FloatArray]:
-    """Columns of a CSV file of a trajectory; see `save_csv`."""
-    model, angles = trajectory.model, trajectory.orientation_error
-    moments = np.zeros((len(trajectory.times), 0)) if trajectory.link_moments is None else trajectory.link_moments
-    last = {f"moment_{link}": column for link, column in enumerate(moments.T, start=1)}
-    columns = {"t": trajectory.times} | dict(zip("xyz", trajectory.targets.T, strict=True))
-    columns |= dict(zip(("tip_x", "tip_y", "tip_z"), trajectory.tip_positions.T, strict=True))
-    columns["tip_error"] = trajectory.tip_error
-    if trajectory.orientations is not None and angles is not None:
-        turned = np.array([pin.rpy.matrixToRpy(one) for one in trajectory.orientations])
-        columns |= dict(zip(("roll", "pitch", "yaw"), turned.T, strict=True)) | {"orientation_error": angles}
-    joints = np.hstack([trajectory.q_motors, trajectory.q_springs])
-    for name, column in zip((*model.motor_joints, *model.spring_joints), joints.T, strict=True):
-        while name in columns or name in last:
-            name = f"joint_{name}"
-        columns[name] = column
-    forces = {f"force on {name} [N]": force for name, force in trajectory.contact_forces.items()}
-    return columns | last | forces
-
-
 def _pack_workspace(workspace: Workspace) -> dict[str, Any]:
     arrays = {name: getattr(workspace, name) for name in FIELDS}
     return pack_model(workspace.model, workspace.load) | arrays | {"refused": workspace.refused}
@@ -288,7 +271,7 @@ KINDS.update(
         lambda result: _pack_rows((result.equilibrium,)) | packed_estimate(result),
         lambda fields: estimate_at(_unpack_rows(fields)[0], fields),
     ),
-    trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True, to_table=_table),
+    trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True, to_table=trajectory_table),
     workspace=Kind(Workspace, _pack_workspace, _unpack_workspace, many=True),
     workspace_map=Kind(WorkspaceMap, _pack_map, _unpack_map, many=True),
     branches=Kind(tuple, _pack_branches, _unpack_branches, many=True, items=EquilibriumBranch),

@@ -41,8 +41,8 @@ def pressed_gaps(state: ElasticState) -> PressedGaps | None:
     return PressedGaps(touch.rows[pressed], touch.motor_rows[pressed], touch.forces[pressed])
 
 
-def state_in_contact(equilibrium: Equilibrium, what: str) -> ElasticState:
-    """Return the state of an equilibrium whose contacts have no friction; `what` cannot take friction, in words.
+def check_no_rubbing(equilibrium: Equilibrium, what: str) -> None:
+    """Check that no contact of an equilibrium has friction; `what` cannot take it, in words.
 
     Raises:
         ParameterError: If a contact sticks or slips.
@@ -50,6 +50,15 @@ def state_in_contact(equilibrium: Equilibrium, what: str) -> ElasticState:
     rubbing = [contact.obstacle for contact in equilibrium.contacts if contact.status in (STICKS, SLIPS)]
     if rubbing:
         raise ParameterError("equilibrium", rubbing, f"one whose contacts have no friction: {what} takes none")
+
+
+def state_in_contact(equilibrium: Equilibrium, what: str) -> ElasticState:
+    """Return the state of an equilibrium whose contacts have no friction; `what` cannot take it, in words.
+
+    Raises:
+        ParameterError: If a contact sticks or slips.
+    """
+    check_no_rubbing(equilibrium, what)
     return elastic_state(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, equilibrium.load)
 
 
