@@ -157,8 +157,11 @@ def _joint(element: Element) -> Joint:
 
 
 def _capsule(element: Element) -> CapsuleTag:
-    (x, y, z), (u, v, w) = (_numbers(element, name, "0 0 0").tolist() for name in ("start", "end"))
-    return CapsuleTag(element.get("link", ""), (x, y, z), (u, v, w), float(_numbers(element, "radius", "0")[0]))
+    link, sizes = element.get("link", ""), (("start", "0 0 0"), ("end", "0 0 0"), ("radius", "0"))
+    x, y, z, u, v, w, radius = np.concatenate([_numbers(element, *size) for size in sizes]).tolist()
+    if not all(abs(number) <= LARGEST for number in (x, y, z, u, v, w, radius)):
+        raise ValueError(f"a capsule of link {link} has a number that is not finite or above {LARGEST:g} in size")
+    return CapsuleTag(link, (x, y, z), (u, v, w), radius)
 
 
 def link_at(joint: Element, end: str) -> str:

@@ -169,8 +169,8 @@ class Environment:
         obstacles = []
         for one in data["obstacles"]:
             kind = one.get("kind")
-            if kind not in KINDS:
-                raise NameNotFound("kind of obstacle", kind, KINDS)
+            if not isinstance(kind, str) or kind not in KINDS:
+                raise NameNotFound("kind of obstacle", str(kind), KINDS)
             known = {name.name for name in fields(KINDS[kind]) if name.init}
             values = {name: value for name, value in one.items() if name != "kind"}
             for name in values:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.bounded_reading import read_text
+from softrobots.core.checks import finite_array
 from softrobots.core.errors import DescriptionError, FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
 from softrobots.core.xml_input import read_xml
@@ -91,6 +92,7 @@ def _obstacles(tree: RigidTree, source: str, hull: bool) -> list[Obstacle]:
         if body == "world":
             name = shape.name
         try:
+            finite_array("position", shape.placement.position, (3,), "m")
             obstacles.append(_obstacle(shape, places[body] @ shape.placement, name or None, hull))
         except (ParameterError, FileFormatError) as error:
             raise DescriptionError(f"{source}: the collision shape {shape.name or number} of {body}: {error}") from error
