@@ -23,6 +23,7 @@ from softrobots.description.expansion import expand
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.view.browser import take_picture
 from softrobots.view.figures import canvas, equilibria, inflated_link, motions, vibrations
+from studies.contact.pictures import contact_grip, contact_margins, contact_peg_forces
 from studies.gallery.actuator_plots import actuator_kinds, dry_friction
 from studies.gallery.your_robot import (
     your_robot_ellipses,
@@ -236,6 +237,9 @@ FIGURES: dict[str, Callable[[], Any]] = {
         your_robot_predicted,
         your_robot_sets,
         your_robot_poses,
+        contact_margins,
+        contact_grip,
+        contact_peg_forces,
     )
 }
 """Plots by the name of their file."""

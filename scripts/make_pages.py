@@ -23,6 +23,9 @@ PAGES = {
     "motion_release": "released_arm",
     "motion_gust": "helix_in_a_gust",
     "your_robot": "your_robot",
+    "contact_arm": "contact_arm",
+    "contact_helix": "contact_helix",
+    "contact_pegs": "contact_pegs",
 }
 """Name of each page, and its exhibit."""
 

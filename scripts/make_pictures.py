@@ -25,6 +25,9 @@ PICTURES = (
     "ur5_bench",
     "ur5_with_soft_arm",
     "your_robot",
+    "contact_arm",
+    "contact_helix",
+    "contact_pegs",
 )
 """Exhibits of which there is a picture."""
 

@@ -181,3 +181,39 @@ def test_what_touches_is_drawn_around_links(arm: sr.SoftModel) -> None:
     assert float((corners @ along).max()) == pytest.approx(1.2 + 0.055, abs=1e-9)
     assert np.allclose(corners.mean(axis=0), (0.63 + 0.57 / 2) * along, atol=1e-9)
     assert builder.loaded(sr.solve_equilibrium(arm, (0.3, 0.0, 0.0))).capsules == ()
+
+
+def lifted(way: float) -> np.ndarray:
+    """A motion along z, shape (4, 4), by a way [m]."""
+    pose = np.eye(4)
+    pose[2, 3] = way
+    return pose
+
+
+def test_a_path_in_contact_is_played(arm: sr.SoftModel) -> None:
+    """Obstacles move by their poses, the arrow grows with its force, and the point appears when the tip touches."""
+    import umsgpack
+
+    world = Environment([HalfSpace((-1, 0, 0), offset=-1.0, name="wall"), Sphere(0.1, (0.5, -0.4, 0.1), pose=lifted)])
+    weights = np.array((0.0, 10.0, 20.0, 40.0))
+    path = sr.follow_contact(arm, (0.0, 0.9, -0.4), np.outer(weights, (0, 0, -1)), environment=world, parameters=0.01 * weights)
+    with view(arm, path) as viewer:
+        text = viewer.html()
+        with pytest.raises(sr.ParameterError, match="whose parameter is no time"):
+            viewer.animate(path, speed=2.0)
+    largest = path.equilibria[-1].contacts[0].normal_force
+    assert f"wall presses with 0 to {largest:.3g} N" in text
+    played = umsgpack.unpackb(scene_of(text)[1][-1])
+    assert played["type"] == "set_animation"
+    tracks = {
+        (one["path"].removeprefix("/meshcat/softrobots/"), track["name"]): [key["value"] for key in track["keys"]]
+        for one in played["animations"]
+        for track in one["clip"]["tracks"]
+    }
+    heights = [place[2] for place in tracks["obstacles/1", ".position"]]
+    assert np.allclose(heights, 0.1 + 0.01 * weights, atol=1e-5)
+    (name,) = {name for name, _ in tracks if name.startswith("contacts/")}
+    assert tracks[name, ".visible"] == [False, False, True, True]
+    shares = [scale[0] for scale in tracks[f"load/contact/{name.removeprefix('contacts/')}", ".scale"]]
+    forces = [sum(contact.normal_force for contact in state.contacts) for state in path.equilibria]
+    assert np.allclose(shares, np.array(forces) / largest, atol=1e-5)

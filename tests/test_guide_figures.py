@@ -173,7 +173,7 @@ def test_the_script_makes_what_is_asked_for(tmp_path: Path, capsys: pytest.Captu
     names = {*script["FIGURES"], *script["SCENES"]}
     guides = "".join(
         (CHECKOUT / "docs" / page).read_text(encoding="utf-8")
-        for page in ("actuators.md", "inflatable_arm.md", "own_robot.md", "motion.md", "your_robot.md")
+        for page in ("actuators.md", "contact.md", "inflatable_arm.md", "own_robot.md", "motion.md", "your_robot.md")
     )
     for name in names:
         assert f"images/{name}.png" in guides

@@ -25,6 +25,7 @@ from softrobots.dynamics.vibration import ModeSwing, VibrationModes
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
+from softrobots.statics.contact.contact_path import ContactPath
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.imposed_displacement import ImposedDisplacement
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
@@ -149,6 +150,8 @@ def _words(movement: Movement) -> str:
         return f"mode 1 of {len(movement.modes.frequencies)}, {1.0 / movement.period:.4g} Hz"
     if isinstance(movement, Motion):
         return f"a motion of {movement.time[-1]:g} s"
+    if isinstance(movement, ContactPath):
+        return f"a path in contact of {len(movement.equilibria)} equilibria"
     return f"a trajectory of {len(movement.times)} waypoints"
 
 
@@ -172,13 +175,13 @@ def _result(arguments: argparse.Namespace) -> Equilibrium | IkSolution | Movemen
         return result.equilibrium
     if isinstance(result, VibrationModes):
         return result.swing(1, SWING * result.model.reach)
-    if isinstance(result, Equilibrium | IkSolution | Trajectory | Motion):
+    if isinstance(result, Equilibrium | IkSolution | Trajectory | ContactPath | Motion):
         return result
     kind = type(result).__name__
     raise ParameterError(
         "--result",
         str(arguments.result),
-        f"an equilibrium, a solution, an estimate, branches, a trajectory, a motion or modes, not a {kind}",
+        f"an equilibrium, a solution, an estimate, branches, a trajectory, a path in contact, a motion or modes, not a {kind}",
     )
 
 

@@ -1,4 +1,4 @@
-"""Frames of an animation: waypoints of a trajectory, evenly spaced interpolated states, a motion, a mode, a growing tube."""
+"""Frames of an animation: waypoints of a path, evenly spaced interpolated states, a motion, a mode, a growing tube."""
 
 from __future__ import annotations
 
@@ -13,11 +13,15 @@ from softrobots.dynamics.vibration import ModeSwing
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
 from softrobots.robots.growth import SHORTEST, grown_coordinates
+from softrobots.statics.contact.contact_path import ContactPath
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
 
-Movement = Trajectory | Motion | ModeSwing
+Path = Trajectory | ContactPath
+"""Equilibria in an order, as many as there are positions of the tip, `tip_positions`."""
+
+Movement = Path | Motion | ModeSwing
 """What can be animated."""
 
 FRAME_RATE = 30
@@ -27,6 +31,7 @@ _MOST_BODIES = 90  # shapes of a continuous body in one animation
 _MOST_RIGID = 600  # frames of a motion of rigid links
 _MOST_BENDING = 50  # frames of a motion whose body bends; a page has about a megabyte at most
 _SWING_TIME = 2.0  # [s], of a mode: most are too fast to be seen
+_CONTACT_TIME = 6.0  # [s], of a path in contact, whose parameter is no time
 _MOST_FRAMES = 2**31 - 1  # a browser's largest frame number
 
 
@@ -57,8 +62,9 @@ def playing_time(model: SoftModel, movement: Movement, duration: float | None, s
             given.
     """
     if not isinstance(movement, Movement):
-        raise ParameterError("movement", movement, "a Trajectory, a Motion or the swing of a mode")
-    if movement.model != model:
+        raise ParameterError("movement", movement, "a Trajectory, a ContactPath, a Motion or the swing of a mode")
+    models = [one.model for one in movement.equilibria] if isinstance(movement, ContactPath) else [movement.model]
+    if any(one != model for one in models):
         raise ParameterError("movement", movement.model, f"a movement of the model given, {model!r}")
     if duration is not None and speed is not None:
         raise ParameterError("speed", speed, "left out where a duration is given")
@@ -66,33 +72,41 @@ def playing_time(model: SoftModel, movement: Movement, duration: float | None, s
         return positive_number("duration", duration, "s")
     if isinstance(movement, ModeSwing):
         return _SWING_TIME if speed is None else movement.period / positive_number("speed", speed)
+    if isinstance(movement, ContactPath):
+        if speed is not None:
+            raise ParameterError("speed", speed, "left out for a path in contact, whose parameter is no time; give a duration")
+        return _CONTACT_TIME
     times = movement.time if isinstance(movement, Motion) else movement.times
     return (float(times[-1] - times[0]) or 1.0) / (1.0 if speed is None else positive_number("speed", speed))
 
 
-def waypoint_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
+def waypoint_frames(path: Path, seconds: float) -> list[Frame]:
     """Return the waypoints, each at the frame nearest to its time."""
-    span = float(trajectory.times[-1] - trajectory.times[0])
-    share = (trajectory.times - trajectory.times[0]) / (span or 1.0)
+    times = _times(path)
+    span = float(times[-1] - times[0])
+    share = (times - times[0]) / (span or 1.0)
     numbers = np.rint(share * seconds * FRAME_RATE).astype(int).tolist()
-    last = dict(zip(numbers, trajectory.equilibria, strict=True))
+    last = dict(zip(numbers, path.equilibria, strict=True))
     return [Frame(number, e.q_motors, e.q_springs, e) for number, e in last.items()]
 
 
-def even_frames(trajectory: Trajectory, seconds: float) -> list[Frame]:
+def even_frames(path: Path, seconds: float) -> list[Frame]:
     """Return evenly spaced frames, interpolated linearly between waypoints; few, since a bent body is drawn anew for each."""
     numbers, total = _spread(seconds)
-    times = trajectory.times[0] + (trajectory.times[-1] - trajectory.times[0]) * numbers / total
+    rows, states = _times(path), path.equilibria
+    times = rows[0] + (rows[-1] - rows[0]) * numbers / total
     frames = []
     for number, moment in zip(numbers.tolist(), times, strict=True):
-        after = int(np.clip(np.searchsorted(trajectory.times, moment), 1, max(len(trajectory.times) - 1, 1)))
-        before, after = after - 1, min(after, len(trajectory.times) - 1)
-        interval = float(trajectory.times[after] - trajectory.times[before])
-        share = float(moment - trajectory.times[before]) / interval if interval > 0.0 else 0.0
+        after = int(np.clip(np.searchsorted(rows, moment), 1, max(len(rows) - 1, 1)))
+        before, after = after - 1, min(after, len(rows) - 1)
+        interval = float(rows[after] - rows[before])
+        share = float(moment - rows[before]) / interval if interval > 0.0 else 0.0
+        ends = states[before], states[after]
         motors, springs = (
-            (1.0 - share) * rows[before] + share * rows[after] for rows in (trajectory.q_motors, trajectory.q_springs)
+            (1.0 - share) * begin + share * end
+            for begin, end in ((ends[0].q_motors, ends[1].q_motors), (ends[0].q_springs, ends[1].q_springs))
         )
-        frames.append(Frame(number, motors, springs, trajectory.equilibria[after if share > 0.5 else before]))
+        frames.append(Frame(number, motors, springs, states[after if share > 0.5 else before]))
     return frames
 
 
@@ -149,6 +163,13 @@ def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) ->
         Frame(number, motors, grown_coordinates(tube, max(share, SHORTEST) * tube.length, front - done).ravel(), None, share)
         for number, share, done in zip(numbers.tolist(), shares.tolist(), formed.tolist(), strict=True)
     ]
+
+
+def _times(path: Path) -> FloatArray:
+    """When each waypoint is shown: at its time; those of a path in contact at their parameters if these grow, else evenly."""
+    if isinstance(path, Trajectory):
+        return path.times
+    return path.parameters if np.all(np.diff(path.parameters) > 0.0) else np.arange(len(path.equilibria), dtype=float)
 
 
 def _spread(seconds: float, most: int = _MOST_BODIES) -> tuple[FloatArray, int]:

@@ -11,6 +11,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.motion import Motion
+from softrobots.dynamics.vibration import ModeSwing
 from softrobots.environment.environment import Environment
 from softrobots.model.link_limits import link_limits
 from softrobots.model.soft_model import SoftModel
@@ -18,7 +19,6 @@ from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone, frame_placement
 from softrobots.statics.loads import Load
-from softrobots.statics.trajectory import Trajectory
 from softrobots.view.actuator_curves import actuator_curves
 from softrobots.view.animation_frames import (
     Frame,
@@ -174,7 +174,7 @@ class SceneBuilder:
         They are waypoints; evenly spaced shapes of a body that bends; or those of a motion or a mode, see `motion_frames`.
         """
         sections = len(self._model.structure.section_table)
-        if not isinstance(movement, Trajectory):
+        if isinstance(movement, Motion | ModeSwing):
             moving = motion_frames(movement, seconds) if isinstance(movement, Motion) else swing_frames(movement, seconds)
             return {frame.number: self._scene(frame, max(_RINGS // max(sections, 1), 2)) for frame in moving}
         frames = (even_frames if sections else waypoint_frames)(movement, seconds)

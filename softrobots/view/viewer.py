@@ -9,11 +9,12 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, positive_integer
 from softrobots.core.errors import ParameterError, ViewerError
+from softrobots.dynamics.motion import Motion
+from softrobots.dynamics.vibration import ModeSwing
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.inverse_kinematics import IkSolution
-from softrobots.statics.trajectory import Trajectory
 from softrobots.view.animation_frames import Movement, playing_time
 from softrobots.view.meshcat_page.page_text import legend_rows, live_page, page_text
 from softrobots.view.meshcat_page.robot import RobotDrawing
@@ -126,25 +127,27 @@ class Viewer(WrittenPage):
         speed: float | None = None,
         repetitions: int = 1000,
     ) -> None:
-        """Play a trajectory or a motion as a meshcat animation that starts by itself and can be scrubbed.
+        """Play a trajectory, a path in contact or a motion as a meshcat animation that starts by itself and can be scrubbed.
 
         Path and forces are included. Links of a motion are coloured by the moments of their springs, and axial forces without
         inertia.
 
         Args:
-            movement: A trajectory, a motion, or the swing of a mode (`VibrationModes.swing`) of the viewer's robot.
-            duration: Time of the animation [s]; real time by default, 2 s for a mode.
+            movement: A trajectory, a path in contact, a motion, or the swing of a mode (`VibrationModes.swing`) of the viewer's
+                robot.
+            duration: Time of the animation [s]; real time by default, 2 s for a mode, 6 s for a path in contact.
             speed: How fast it is played, relative to real time [-], e.g. 0.1; in place of `duration`.
             repetitions: How often; many, because meshcat mixes start and end when it is scrubbed after the last one.
 
         Raises:
-            ParameterError: If it belongs to another robot, duration or speed is not positive, or both are given.
+            ParameterError: If it belongs to another robot, duration or speed is not positive, both are given, or a speed for
+                a path in contact.
         """
         seconds = playing_time(self._model, movement, duration, speed)
         positive_integer("repetitions", repetitions)
         self._check_open()
         scenes = self._scenes.movement(movement, seconds)
-        path = movement.tip_positions if isinstance(movement, Trajectory) else movement.tip_position
+        path = movement.tip_position if isinstance(movement, Motion | ModeSwing) else movement.tip_positions
         self.look_at(path.mean(axis=0))
         self._robot.show(next(iter(scenes.values())))
         self._robot.trace(path)
@@ -235,8 +238,8 @@ def view(model: SoftModel, result: Equilibrium | IkSolution | Movement | None = 
 
     Args:
         model: The robot.
-        result: An equilibrium to show, a solution of the inverse kinematics to show with its target, or a trajectory or motion
-            to play; the robot at rest by default.
+        result: An equilibrium to show, a solution of the inverse kinematics to show with its target, or a trajectory, path in
+            contact or motion to play; the robot at rest by default.
         port: Port of the page; by default the first free one from 7000.
 
     Returns:

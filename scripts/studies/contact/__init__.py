@@ -1,1 +1,1 @@
-"""Grips of robots around objects; see scripts/helix_grip.py."""
+"""Robots in contact; see scripts/contact.py and scripts/helix_grip.py."""

@@ -20,6 +20,7 @@ from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
 from softrobots.statics.trajectory import Trajectory, follow_trajectory
 from softrobots.view.viewer import Viewer, view
+from studies.contact import examples as contact
 from studies.gallery.your_robot import measured_poses
 from studies.motion.examples import gust, release
 from studies.ur5.bench import UR5Bench
@@ -214,6 +215,31 @@ def ur5_with_soft_arm() -> Viewer:
     return view(model, solve_equilibrium(model, pose, payload, gravity=EARTH_GRAVITY))
 
 
+def leaning_arm() -> Viewer:
+    """The arm of docs/contact.md: the weight on its tip grows to 41 N, and it leans on a wall."""
+    viewer = view(load_model(InflatableArm()), contact.brace(np.linspace(0.0, 41.0, 25)))
+    viewer.look_from((0.75, -1.45, 0.85), (0.52, 0.0, 0.38))
+    return viewer
+
+
+def gripping_helix() -> Viewer:
+    """The helix of docs/contact.md, into which a rod is pushed."""
+    path = contact.grip(np.linspace(0.0, contact.DEPTH, 49))
+    viewer = Viewer(path.model)
+    viewer.animate(path, duration=1.6)  # a smaller page
+    viewer.look_from((0.27, -0.33, 0.33), (0.0, 0.0, 0.2))
+    return viewer
+
+
+def rod_between_pegs() -> Viewer:
+    """The rod of docs/contact.md, against which pegs move from both sides."""
+    path = contact.snake(np.linspace(0.0, contact.STROKE, 41))
+    viewer = Viewer(path.model)
+    viewer.animate(path, duration=2.0)
+    viewer.look_from((0.13, -0.32, 0.27), (0.0, 0.0, 0.2))
+    return viewer
+
+
 def in_slow_motion(motion: Motion, speed: float) -> Viewer:
     """A motion, played at a speed relative to real time."""
     viewer = Viewer(motion.model)
@@ -240,6 +266,9 @@ EXHIBITS = {
     "released_arm": Exhibit(lambda: in_slow_motion(release(), 0.5), "The sagging arm is let go, at half speed", 0.06),
     "helix_in_a_gust": Exhibit(lambda: in_slow_motion(gust(), 0.5), "A helical tube in a gust, at half speed", 0.1),
     "your_robot": Exhibit(measured_poses, "A fitted arm in its measured poses (synthetic)", 25.5 / 60),
+    "contact_arm": Exhibit(leaning_arm, "The inflatable arm leans on a wall and carries twice the load", 1.0),
+    "contact_helix": Exhibit(gripping_helix, "A helix grips the rod that is pushed into it", 1.0),
+    "contact_pegs": Exhibit(rod_between_pegs, "A rod snakes between pegs", 1.0),
     "ur5_with_soft_arm": Exhibit(ur5_with_soft_arm, "UR5 with a soft arm, 1 kg at its tip"),
 }
 """The scenes by name."""
