@@ -247,6 +247,7 @@ BALL = '<geom size=".1"/>'
             MJCF.replace('file="wedge.obj" scale="1 1 2"', 'vertex="0 0 0 1 0 0 0 1 0 0 0 1"'),
             "not read: mesh '' of wedge",
         ),
+        ("a.xml", f"<mujoco><worldbody>{BALL * 1001}</worldbody></mujoco>", "a.xml has 1001 collision shapes; at most 1000"),
         ("a.xml", "<mujoco><worldbody/></mujoco>", "has no bodies"),
         ("a.xml", MJCF.replace('size=".3"', 'size="nan"'), "MuJoCo"),
         ("a.xml", MJCF.replace('pos="2 0 0"', 'pos="-Infinity 0 0"'), "the collision shape 2 of world: position"),
@@ -276,6 +277,7 @@ def test_worlds_that_are_no_obstacles_are_refused(name: str, text: str, message:
     [
         ("obstacles: [{kind: cone}]", "cannot read obstacles from .*a.yaml: .*kind of obstacle"),
         ("obstacles: [{kind: [sphere]}]", "kind of obstacle"),
+        (f"obstacles: [{'{}, ' * 1001}]", "1001 obstacles; at most 1000 are read"),
         ("obstacles: [{kind: sphere, radius: -1}]", "radius"),
         ("obstacles: [{kind: sphere}]", "radius"),
         ("obstacles: [{kind: sphere, radius: 1, size: 2}]", "size"),

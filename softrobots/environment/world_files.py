@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -23,6 +24,8 @@ PLAIN_DATA = (".yaml", ".yml", ".json")
 """What names of files of plain data end with."""
 LARGEST_FILE = 10_000_000
 """Largest size of a file of plain data [bytes]."""
+MOST_OBSTACLES = 1000
+"""Most obstacles of a file."""
 
 _DEEPEST, _MOST_VALUES = 6, 50_000  # of YAML: rows of corners in an obstacle in the list
 _READ = ("box", "cylinder", "sphere", "capsule", "mesh", "plane")
@@ -58,8 +61,11 @@ def read_obstacles(file: Path, *, hull: bool = False) -> list[Obstacle]:
 
 def _beside(data: Any, folder: Path) -> Any:
     """Plain data in which the relative files of meshes are those of a folder."""
-    obstacles = data.get("obstacles") if isinstance(data, dict) else None
-    for one in obstacles if isinstance(obstacles, list) else ():
+    given = data.get("obstacles") if isinstance(data, dict) else None
+    obstacles = given if isinstance(given, list) else []
+    if len(obstacles) > MOST_OBSTACLES:
+        raise FileFormatError(f"it has {len(obstacles)} obstacles; at most {MOST_OBSTACLES} are read")
+    for one in obstacles:
         name = one.get("vertices") if isinstance(one, dict) else None
         if isinstance(name, str) and "://" not in name:
             one["vertices"] = str(folder / name)
@@ -76,6 +82,8 @@ def _obstacles(tree: RigidTree, source: str, hull: bool) -> list[Obstacle]:
     for joint in tree.joints:  # parents first
         places[joint.child] = places[joint.parent] @ joint.placement
     shapes = [(body.name, number, shape) for body in tree.bodies for number, shape in enumerate(body.collisions, start=1)]
+    if len(shapes) > MOST_OBSTACLES:
+        raise DescriptionError(f"{source} has {len(shapes)} collision shapes; at most {MOST_OBSTACLES} are read")
     others = [
         f"{shape.kind} {shape.name!r} of {body}"
         for body, _, shape in shapes
@@ -85,10 +93,9 @@ def _obstacles(tree: RigidTree, source: str, hull: bool) -> list[Obstacle]:
         raise DescriptionError(
             f"{source} has collision shapes that are not read: {', '.join(others)}; required: {', '.join(_READ)} (from a file)"
         )
-    obstacles = []
+    obstacles, shapes_of = [], Counter(body for body, _, _ in shapes)
     for body, number, shape in shapes:
-        alone = sum(name == body for name, _, _ in shapes) == 1
-        name = body if alone else f"{body}_{shape.name or number}"
+        name = body if shapes_of[body] == 1 else f"{body}_{shape.name or number}"
         if body == "world":
             name = shape.name
         try:
