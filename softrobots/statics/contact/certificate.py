@@ -12,10 +12,12 @@ from itertools import chain, combinations
 from typing import Any, NamedTuple
 
 import numpy as np
+from eigenpy import LDLT
 
 from softrobots.core.checks import FloatArray
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.touch import TOUCHING, Touch
+from softrobots.statics.elastic_state import positive
 
 _MOST_WEAK = 8  # touches without force beyond which the cone is not examined
 _INDEPENDENT = 1e-9  # least singular value of gradients over the largest
@@ -68,9 +70,9 @@ def softest_motion(
         rounding: Residual that counts as none [N m].
 
     Returns:
-        The curvature relative to the springs, infinite where contacts leave no motion; and the motion, shape (n,), of unit
-        length in coordinates in which the springs have stiffness 1. Of more than 8 touches without force, or where a curvature
-        of zero or less is that of several motions, the touches are left out: the answer is a lower bound.
+        The curvature relative to the springs, infinite where it is positive for all motions; and the motion, shape (n,), of
+        unit length in coordinates in which the springs have stiffness 1. Of more than 8 touches without force, or where a
+        curvature of zero or less is that of several motions, the touches are left out: the answer is a lower bound.
     """
     active = active_contacts(touch, reach, rounding)
     pressed, weak = touch.rows[active.pressed], touch.rows[active.weak]
@@ -80,6 +82,8 @@ def softest_motion(
     relative = soft[:, None] * tangent * soft
     beside = null_space(pressed * soft) if len(pressed) else np.eye(len(soft))
     form, cone = beside.T @ relative @ beside, (weak * soft) @ beside
+    if not len(form) or positive(LDLT(len(form)), form - 2.0 * POSITIVE * np.eye(len(form))):
+        return np.inf, np.zeros(len(soft))
     value, motion = _least(form, np.eye(len(form)))
     if value <= POSITIVE and 0 < len(cone) <= _MOST_WEAK:
         value, motion = _least_on_cone(form, cone)
