@@ -38,6 +38,7 @@ def pages() -> list[str]:
         "agreement",
         "beam_validity",
         "soak",
+        "soak_contact",
         "fuzzing",
         "environments",
         "coverage",

@@ -10,6 +10,7 @@ muscle rows of this module. Whole batches of cases are evaluated at once, for an
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -41,6 +42,17 @@ class Case(NamedTuple):
     def repeated(self, count: int) -> Case:
         """A batch of one, many times."""
         return Case(*(np.repeat(array, count, axis=0) for array in self))
+
+
+class Push(NamedTuple):
+    """A force on a body, in every case."""
+
+    body: int
+    """Number of the body: that of its joint."""
+    force: FloatArray
+    """World axes, shape (3,) [N]."""
+    point: FloatArray
+    """Where it acts, in the world, shape (3,) [m]."""
 
 
 class Balance(NamedTuple):
@@ -112,18 +124,19 @@ class PlainStatics:
     def _names(self, group: Any) -> list[str]:
         return [self.model.spring_joints[place] for place in group.springs]
 
-    def balance(self, case: Case, springs: FloatArray) -> Balance:
+    def balance(self, case: Case, springs: FloatArray, pushes: Sequence[Push] = ()) -> Balance:
         """Sum up the loads.
 
         Args:
             case: Actuators and loads, n rows.
             springs: Elastic coordinates, shape (n, n_springs).
+            pushes: More forces, each on a point of a body.
 
         Returns:
             What is out of balance, n rows.
         """
         strains = self._strains(case.motors, springs)
-        torques, size, tip = self._torques(case, strains)
+        torques, size, tip = self._torques(case, strains, pushes)
         rows = self._spring_loads(strains)
         rounding = 16.0 * np.finfo(np.float64).eps * np.linalg.norm(rows, axis=1)
         count = len(self._spring_columns)
@@ -163,12 +176,12 @@ class PlainStatics:
             loads[:, places] *= np.where(moment > largest, largest / np.maximum(moment, largest), 1.0)[:, None]
         return np.asarray(loads)
 
-    def _torques(self, case: Case, strains: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _torques(self, case: Case, strains: FloatArray, pushes: Sequence[Push]) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Load on every joint, shape (n, nv); the size of the load; and the tip."""
         n = len(strains)
         turns, points = self._bodies(case.motors, strains)
         tip = points[self._tip_parent] + turns[self._tip_parent] @ self._tip
-        pulled = self._carried(turns, points, tip, case.forces, case.moments, None)
+        pulled = self._carried(turns, points, tip, case.forces, case.moments, None, pushes)
         weighed = self._carried(turns, points, tip, np.zeros((n, 3)), np.zeros((n, 3)), case.gravity)
         norm = np.linalg.norm
         size = norm(case.forces, axis=1) * self.model.reach + norm(case.moments, axis=1) + norm(weighed, axis=1)
@@ -185,8 +198,12 @@ class PlainStatics:
         centres = [point + turn @ lever for point, turn, (_, lever) in zip(points, turns, self._masses, strict=True)]
         return np.stack(turns, axis=1), np.stack(centres, axis=1)
 
+    def frames(self, motors: FloatArray, springs: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
+        """Rotation and origin of every body in the world, shapes (n, 3, 3) and (n, 3); arguments as of `bodies`."""
+        return self._bodies(motors, self._strains(motors, springs))
+
     def _bodies(self, motors: FloatArray, strains: FloatArray) -> tuple[list[FloatArray], list[FloatArray]]:
-        """Rotation and origin of every body in the world, shapes (n, 3, 3) and (n, 3)."""
+        """The same at strains."""
         joints = self._joints(motors, strains)
         n = len(joints)
         turns: list[FloatArray] = [np.tile(np.eye(3), (n, 1, 1))]
@@ -213,6 +230,7 @@ class PlainStatics:
         force: FloatArray,
         moment: FloatArray,
         gravity: Any,
+        pushes: Sequence[Push] = (),
     ) -> FloatArray:
         """Torque that each joint must carry, from the tip to the base."""
         n = len(tip)
@@ -220,6 +238,9 @@ class PlainStatics:
         moments: list[FloatArray] = [np.zeros((n, 3)) for _ in range(self._count)]  # about the origin of the world
         forces[self._tip_parent] = np.array(force)
         moments[self._tip_parent] = moment + np.cross(tip, force)
+        for push in pushes:
+            forces[push.body] = forces[push.body] + push.force
+            moments[push.body] = moments[push.body] + np.cross(push.point, push.force)
         torques = np.zeros((n, self.model.pinocchio.nv))
         for number in range(self._count - 1, 0, -1):
             if gravity is not None:
