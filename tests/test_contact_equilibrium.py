@@ -345,6 +345,8 @@ def test_what_contact_cannot_have_is_refused_by_name(arm: sr.SoftModel) -> None:
     floor = Environment([HalfSpace((0, 0, 1), -0.1)])
     with pytest.raises(sr.ParameterError, match="'newton' in contact"):
         sr.solve_equilibrium(arm, MOTORS, FORCE, environment=floor, method="fixed_point")
+    with pytest.raises(sr.ParameterError, match="follow_contact takes moments"):
+        sr.solve_equilibrium(arm, MOTORS, wrench=(0, 0, 0, 0, 1, 0), environment=floor)
     with pytest.raises(sr.ParameterError, match="environment"):
         sr.solve_equilibrium(arm, MOTORS, FORCE, environment=[HalfSpace((0, 0, 1))])
     block = Environment([Box((0.05, 0.05, 0.05), (0.03, 0.0, 0.07))])

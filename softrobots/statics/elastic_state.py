@@ -140,7 +140,7 @@ def _evaluated(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, lo
     if state.touch is None:
         return state
     forces = resting_forces(state.touch, state.residual, model.reach)
-    return problem.state(q_springs, ForceTable(state.touch.gaps.keys, forces)) if forces.any() else state
+    return problem.state(q_springs, ForceTable.of(state.touch.gaps, forces)) if forces.any() else state
 
 
 def _with_curvature(point: Point, reduced: ReducedLoad, touch: Touch) -> ReducedLoad:

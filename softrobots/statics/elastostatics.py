@@ -78,7 +78,9 @@ def solve_springs(
         if method != "newton":
             raise ParameterError("method", method, "'newton' in contact with an environment")
         if not load.conservative:
-            raise ParameterError("wrench", load.wrenches, "forces only in contact with an environment: moments have no energy")
+            raise ParameterError(
+                "wrench", load.wrenches, "forces only in contact: follow_contact takes moments, which have no energy"
+            )
         solve = settle
     with one_blas_thread(model.n_springs):
         state, spent, stable = solve(ElasticProblem(model, q_motors, load, tolerance), start, most)

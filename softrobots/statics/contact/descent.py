@@ -48,7 +48,7 @@ class Near(NamedTuple):
     @property
     def table(self) -> ForceTable:
         """Its contact forces."""
-        return ForceTable(self.touch.gaps.keys, self.touch.forces)
+        return ForceTable.of(self.touch.gaps, self.touch.forces)
 
     @property
     def load(self) -> FloatArray:
@@ -185,7 +185,7 @@ class ContactSearch:
 
         share, first = 1.0, self.spent
         while self.spent < self.most and share > _SHORTEST:
-            table = ForceTable(touch.gaps.keys, touch.forces + share * change)
+            table = ForceTable.of(touch.gaps, touch.forces + share * change)
             trial = self.near(state.q_springs + share * whole, table)
             if share == 1.0 and trial is not None and not better(trial, share):
                 back = _back_to_surface(trial.touch, self._stiffness)

@@ -47,7 +47,7 @@ def _of_least_norm(search: ContactSearch, found: Near) -> Near | None:
     if len(rows) < 2 or len(rows) == rows.shape[1] - null_space(rows).shape[1]:
         return None
     forces = resting_forces(found.touch, found.load, reach)
-    least = search.near(found.state.q_springs, ForceTable(found.touch.gaps.keys, forces))
+    least = search.near(found.state.q_springs, ForceTable.of(found.touch.gaps, forces))
     return least if least is not None and least.error <= max(BALANCED, found.error) else None
 
 

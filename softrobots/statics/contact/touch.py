@@ -8,8 +8,7 @@ With gaps :math:`g_i(y)` and normal forces :math:`\lambda_i`, the contacts load 
 from __future__ import annotations
 
 import threading
-from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -66,32 +65,31 @@ class Touch(NamedTuple):
 class ForceTable(NamedTuple):
     """Normal forces by candidate, to carry them from one evaluation to the next."""
 
-    keys: Sequence[Any]
-    """Candidates, see `Gaps.keys`."""
-    forces: FloatArray
-    """Their normal forces [N]."""
+    entries: tuple[tuple[int, int, int, float], ...]
+    """Capsule, obstacle, feature, and force [N] where there is one."""
+
+    @classmethod
+    def of(cls, gaps: Gaps, forces: FloatArray) -> ForceTable:
+        """Take the forces on candidates, shape (m,) [N]."""
+        places = forces.nonzero()[0]
+        columns = (column[places].tolist() for column in (gaps.capsules, gaps.obstacles, gaps.features, forces))
+        return cls(tuple(zip(*columns, strict=True)))
 
     def at(self, gaps: Gaps) -> FloatArray:
         """Forces on other candidates, shape (m,) [N]; zero on new ones.
 
         The force on a candidate that is no longer there passes to the nearest other one of the same pair of bodies.
         """
-        if gaps.keys == self.keys:
-            return self.forces
-        forces, places = np.zeros(len(gaps.keys)), {key: place for place, key in enumerate(gaps.keys)}
-        for key, force in zip(self.keys, self.forces.tolist(), strict=True):
-            if force > 0.0:
-                place = places.get(key)
-                if place is None:
-                    pair = np.flatnonzero((gaps.capsules == key[0]) & (gaps.obstacles == key[1]))
-                    if not len(pair):
-                        continue
-                    place = pair[int(gaps.values[pair].argmin())]
-                forces[place] += force
+        forces = np.zeros(len(gaps.values))
+        for capsule, obstacle, feature, force in self.entries:
+            pair = ((gaps.capsules == capsule) & (gaps.obstacles == obstacle)).nonzero()[0]
+            if len(pair):
+                same = pair[gaps.features[pair] == feature]
+                forces[same[0] if len(same) else pair[gaps.values[pair].argmin()]] += force
         return forces
 
 
-NO_FORCES = ForceTable((), np.zeros(0))
+NO_FORCES = ForceTable(())
 """No contact force yet."""
 
 
