@@ -146,6 +146,9 @@ def test_figures_show_them_too(arm: sr.SoftModel) -> None:
     assert {"obstacle", "wall presses with 25 N", "post presses with 17 N at 2 points", "touches floor"} <= set(labels)
     points = [np.ravel(line.get_data_3d()) for line in axes.lines if line.get_marker() == "o" and len(line.get_xdata()) == 1]
     assert np.allclose(points, [contact.point for contact in held.contacts], atol=1e-12)
+    sheet = next(one for one in axes.collections if one.get_label() == "obstacle")  # the wall, around what touches it
+    corners = np.reshape(sheet._faces if hasattr(sheet, "_faces") else sheet._vec[:3].T, (-1, 3))
+    assert np.allclose(0.5 * (corners.min(axis=0) + corners.max(axis=0))[1:3], (0.0, 0.6), atol=1e-9)
     shafts = [np.array(one._segments3d[0]) for one in axes.collections if hasattr(one, "_segments3d")]
     reach = 0.2 * arm.reach  # the arrow of the largest force comes from behind the wall
     assert any(np.allclose(sorted(map(tuple, ends)), [(1.06, 0, 0.6), (1.06 + reach, 0, 0.6)], atol=1e-9) for ends in shafts)

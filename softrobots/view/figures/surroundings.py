@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.environment.environment import Environment
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.view.appearance import CONTACT_COLOUR, OBSTACLE_COLOUR
 from softrobots.view.figures.canvas import plain_words
@@ -29,16 +30,17 @@ def draw_surroundings(axes: Any, equilibrium: Equilibrium, around: FloatArray) -
     Returns:
         Points for `equal_box`, shape (m, 3) [m]: arrows, and the obstacles that are not larger than the robot.
     """
-    obstacles = drawn_obstacles(equilibrium.load.environment, around.mean(axis=0), _SHEET * equilibrium.model.reach)
-    seen = [np.zeros((0, 3))]
-    for number, obstacle in enumerate(obstacles):
+    contacts, seen = drawn_contacts(equilibrium), [np.zeros((0, 3))]
+    for number, surrounding in enumerate(equilibrium.load.environment or ()):
+        touched = [contact.point for contact in contacts.values() if contact.obstacle == surrounding.name]
+        centre = np.mean(touched or around, axis=0)  # of the sheet that stands for a half-space
+        (obstacle,) = drawn_obstacles(Environment([surrounding]), centre, _SHEET * equilibrium.model.reach)
         corners, faces, _ = triangles(obstacle.geometry)
         placed = corners @ obstacle.pose[:3, :3].T + obstacle.pose[:3, 3]
         look = {"color": OBSTACLE_COLOUR[:3], "alpha": OBSTACLE_COLOUR[3], "lw": 0.0, "shade": True}
         axes.plot_trisurf(*placed.T, triangles=faces, label="" if number else "obstacle", **look)
         if np.ptp(placed, axis=0).max() <= equilibrium.model.reach:
             seen.append(placed)
-    contacts = drawn_contacts(equilibrium)
     largest = max((float(np.linalg.norm(one.force)) for one in contacts.values()), default=0.0)
     colour = f"#{CONTACT_COLOUR:06x}"
     for one in contacts.values():
