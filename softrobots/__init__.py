@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 import softrobots.dynamics.saved_modes
 import softrobots.dynamics.saved_motion
 import softrobots.identification.saved_identification
-import softrobots.identification.saved_measurements  # noqa: F401  (adds the kinds of results that can be saved)
+import softrobots.identification.saved_measurements
+import softrobots.statics.contact.saved_path  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.core.errors import (
     ClusterError,

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -9,7 +11,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from tests.support.laws import law
-from tests.support.planar_robots import block, ladder
+from tests.support.planar_robots import block, ladder, rope
 
 FLOOR = sr.Environment([sr.HalfSpace((0, 0, 1))])
 
@@ -99,3 +101,146 @@ def test_a_ladder_on_two_walls_slips_at_the_pull_of_the_closed_form() -> None:
     assert [one.status for one in path.contacts[3]] == ["slips", "slips"]
     first = min(event.parameter for event in path.events if event.kind == "slips")
     assert first == pytest.approx(2.0, abs=0.05)  # radius over length, 1e-5, of a pull that changes by 1e-3, and the last step
+
+
+@pytest.mark.study
+def test_a_rope_around_a_cylinder_pulls_as_the_capstan() -> None:
+    """T2 / T1 -> exp(mu phi) between vertices that slip, with an error of second order in the angle of a link.
+
+    Forces of the rope at its vertices follow from the contacts beyond; their directions enclose phi.
+    """
+    friction, radius, thickness, wrapped = 0.3, 0.1, 1e-4, 0.5 * np.pi
+    errors = []
+    for links in (5, 10):
+        model = rope(links, wrapped, radius, thickness, 1e-3, 5000.0)
+        lying = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
+        drum = sr.Environment([sr.Cylinder(radius, 1.0, position=(0, 0, -radius - thickness), rotation=lying)])
+        leaving = wrapped + 0.5 * wrapped / links
+        pull = 2.0 * np.array([np.cos(leaving), 0.0, -np.sin(leaving)])
+        path = sr.follow_contact(model, [], [(0, 0, 0), pull], environment=drum, friction=friction)
+        slips = [one for one in path.contacts[-1] if one.status == "slips"]
+        assert len(slips) >= links - 1
+        forces = np.array([pull + sum((one.force for one in slips[first:]), np.zeros(3)) for first in range(1, len(slips))])
+        start, end = forces[0], forces[-1]
+        angle = np.arccos(start @ end / np.linalg.norm(start) / np.linalg.norm(end))
+        errors.append(np.log(np.linalg.norm(end) / np.linalg.norm(start)) / (friction * angle) - 1.0)
+    assert np.abs(errors[1]) < 0.01
+    assert np.abs(errors[1]) < 0.4 * np.abs(errors[0])  # a quarter at second order
+
+
+def test_little_friction_is_nearly_none(arm: sr.SoftModel) -> None:
+    """With mu -> 0 the path ends in the certified equilibrium without friction, linearly in mu."""
+    floor = sr.Environment([sr.HalfSpace((0, 0, 1), -0.1)])
+    motors, forces = (0.3, -0.2, 0.3), np.outer((0.0, 0.5, 1.0), (0.0, 2.0, -20.0))
+    still = sr.solve_equilibrium(arm, motors, forces[-1], environment=floor)
+
+    def apart(friction: float) -> float:
+        path = sr.follow_contact(arm, motors, forces, environment=floor, friction=friction)
+        return float(np.abs(path.equilibria[-1].q_springs - still.q_springs).max())
+
+    assert apart(0.0) < 1e-9  # of the tolerance of the residual
+    assert apart(1e-5) == pytest.approx(0.01 * apart(1e-3), rel=0.02)
+
+
+def lifted(parameter: float) -> np.ndarray:
+    """A pose: down along z by the parameter."""
+    pose = np.eye(4)
+    pose[2, 3] = -parameter
+    return pose
+
+
+@pytest.mark.study
+def test_an_arm_that_slips_off_a_ball_jumps_and_loses_the_energy_that_it_had(arm: sr.SoftModel) -> None:
+    """A ball moves down through an arm; the arm snaps aside, and energy, work of the ball and loss balance."""
+    motors = (0.0, 0.3, -0.3)
+    tip = sr.solve_equilibrium(arm, motors).tip_position
+    ball = sr.Environment([sr.Sphere(0.05, position=tip + (0.02, 0.0, 0.12), pose=lifted)])
+    path = sr.follow_contact(arm, motors, environment=ball, parameters=np.linspace(0.0, 0.3, 16))
+    (jump,) = path.jumps
+    assert jump.energy_lost > 0.0
+    assert jump.distance > 0.1
+    assert {event.kind for event in path.events} == {"made", "lost"}
+    assert not path.contacts[-1]
+    assert np.abs(path.equilibria[-1].q_springs).max() < 1e-9  # back at rest: all the work of the ball is lost
+    pushes, steps = path.forces[:, 2], np.diff(path.parameters)
+    work = -np.sum(0.5 * (pushes[1:] + pushes[:-1]) * steps)
+    assert work == pytest.approx(jump.energy_lost, abs=0.5 * np.ptp(pushes) * steps[0])  # the row of the jump
+    stopped = sr.follow_contact(
+        arm, motors, environment=ball, parameters=np.linspace(0.0, 0.3, 4), allow_jumps=False, progress="ball"
+    )
+    assert "leaves its equilibrium" in stopped.ended
+    assert len(stopped.equilibria) == 2
+    assert not stopped.jumps
+
+
+def test_an_obstacle_that_moves_drags_what_sticks(arm: sr.SoftModel) -> None:
+    """A floor that moves sideways under a pressed arm takes its surface along until mu N, then holds it back by mu N."""
+
+    def sideways(parameter: float) -> np.ndarray:
+        pose = np.eye(4)
+        pose[1, 3] = parameter
+        return pose
+
+    slab = sr.Environment([sr.Box((4, 4, 0.2), position=(2.2, 0, -0.15), pose=sideways)])
+    path = sr.follow_contact(
+        arm, (0.0, 0.0, 0.0), (0, 0, -10.0), environment=slab, friction=0.4, parameters=np.linspace(0.0, 0.1, 6)
+    )
+    for parameter, row in zip(path.parameters, path.contacts, strict=True):
+        sideways_force = sum(one.force[1] for one in row)
+        limit = 0.4 * sum(one.normal_force for one in row)
+        assert abs(sideways_force) <= limit * (1 + 1e-9)
+        if all(one.status == "sticks" for one in row) and parameter > 0.0:
+            assert path.tip_positions[round(parameter / 0.02), 1] > 0.9 * parameter
+    assert path.dissipation[-1] > 0.0
+    assert np.all(np.diff(path.dissipation) >= 0.0)
+
+
+@pytest.mark.study
+def test_a_tube_grows_past_an_obstacle() -> None:
+    """Growth carries the shape along: without forces the tube keeps its strains, and beside a ball it leans on it."""
+    tube = sr.HelixTube(length=0.4, contraction=0.99, angle=0.0, elastic_sections=4, bending_stiffness=0.02)
+
+    def grown(length: float) -> sr.SoftModel:
+        return sr.load_model(tube.grown(length))
+
+    middle = sr.solve_equilibrium(grown(0.48), []).tip_position
+    ball = sr.Environment([sr.Sphere(0.03, position=middle + (0.0, 0.035, 0.03))])
+    lengths = np.array([0.4, 0.5])
+    path = sr.follow_contact(grown, [], environment=ball, friction=0.2, parameters=lengths)
+    assert [len(one.q_springs) for one in path.equilibria] == [16, 20]
+    free = [sr.solve_equilibrium(grown(length), []) for length in lengths]
+    assert path.tip_positions[0] == pytest.approx(free[0].tip_position, abs=1e-12)
+    (contact, *_) = path.contacts[1]
+    assert contact.normal_force > 0.0
+    assert (path.tip_positions[1] - free[1].tip_position) @ contact.normal > 1e-4  # pushed aside
+    assert any(event.kind == "made" for event in path.events)
+
+
+def test_a_path_is_saved_and_loaded_with_its_friction(tmp_path: Path) -> None:
+    path = sr.follow_contact(block(), [[0.0], [0.1], [0.05]], (0, 0, -10.0), environment=FLOOR, friction=0.3)
+    for suffix in ("npz", "json"):
+        read = sr.load_result(sr.save_result(path, tmp_path / f"path.{suffix}"))
+        assert read.summary == path.summary
+        assert read.forces == pytest.approx(path.forces, abs=1e-12)
+        assert [[one.status for one in row] for row in read.contacts] == [["sticks"], ["slips"], ["sticks"]]
+    lines = sr.save_csv(path, tmp_path / "path.csv").read_text(encoding="utf-8").splitlines()
+    assert len(lines) == 4
+    assert lines[0].startswith("parameter,dissipation_J,tip_x_m")
+    with pytest.raises(sr.ParameterError, match="a ContactPath is saved with its friction"):
+        sr.save_result(path.equilibria[-1], tmp_path / "one.npz")
+
+
+REFUSED = {
+    "rows": (lambda: sr.follow_contact(block(), [[0.0], [1.0]], np.zeros((3, 3)), environment=FLOOR), "one row, or 3"),
+    "environment": (lambda: sr.follow_contact(block(), [0.0], environment=None), "an Environment"),
+    "friction": (lambda: sr.follow_contact(block(), [0.0], environment=FLOOR, friction=-0.1), "friction"),
+    "parameters": (lambda: sr.follow_contact(block(), [0.0], environment=FLOOR, parameters=[1, 0]), "increasing"),
+    "grown": (lambda: sr.follow_contact(lambda length: block(), [0.0], environment=FLOOR), "a function of them"),
+}
+
+
+@pytest.mark.parametrize("case", REFUSED)
+def test_what_is_refused_says_why(case: str) -> None:
+    call, words = REFUSED[case]
+    with pytest.raises(sr.ParameterError, match=words):
+        call()

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-import pinocchio as pin
 import pytest
 from scipy.optimize import minimize
 
@@ -64,39 +63,6 @@ def test_fingers_of_one_hand_touch_as_fingers_of_their_own(fingers: list[sr.Equi
         assert contact.link == alone.link
         assert np.allclose(contact.point, alone.point, rtol=0.0, atol=1e-9)
         assert np.allclose(contact.force, alone.force, rtol=0.0, atol=1e-8)
-
-
-def test_a_finger_lets_an_object_slip_at_the_friction_that_its_elasticity_leaves() -> None:
-    """A cylinder is moved along a finger. While the finger slips, its normal force is `N = N0 / (1 +- mu C_nt / C_nn)`, by the
-    compliance C of the point of contact along normal and pull, here by central differences of free equilibria under its
-    force. That is linear: within 2 % of the path. The force as it presses now, mu N0, is between both ways."""
-    finger, friction = sr.load_model(mounted(PALM, 0, 3)), 0.5
-
-    def object_moved(way: float) -> sr.Environment:
-        pose = {"pose": lambda shift: pin.SE3(np.eye(3), np.array([0.0, 0.0, way * shift]))}
-        return sr.Environment([sr.Cylinder(radius=0.015, length=0.2, position=(0.0, 0.0, 0.11), name="object", **pose)])
-
-    held = sr.solve_equilibrium(finger, [3.0], environment=object_moved(1.0).at(0.0))
-    (touch,) = held.contacts
-
-    def point(force: np.ndarray) -> np.ndarray:
-        wrench = np.concatenate([force, np.cross(touch.point - held.tip_position, force)])
-        moved = sr.solve_equilibrium(finger, [3.0], wrench={finger.tip: wrench}, q_springs0=held.q_springs)
-        return np.asarray(moved.transform_tip_to_world.act(held.transform_tip_to_world.actInv(touch.point)))
-
-    step, up = 1e-4, np.array([0.0, 0.0, 1.0])
-    ratio = [(point(touch.force + step * way) - point(touch.force - step * way)) @ touch.normal for way in (up, touch.normal)]
-    now = sr.pull_out_force(held.contacts, friction, up).force
-    assert now == pytest.approx(friction * touch.normal_force, rel=1e-7)
-    pulls = []
-    for way in (1.0, -1.0):
-        path = sr.follow_contact(
-            finger, [3.0], environment=object_moved(way), friction=friction, parameters=np.linspace(0.0, 2e-3, 3), start=held
-        )
-        assert path.equilibria[-1].contacts[0].status == "slips"
-        pulls.append(float(-way * sr.contact_wrench(path.equilibria[-1].contacts)[2]))
-        assert pulls[-1] == pytest.approx(now / (1.0 + way * friction * ratio[0] / ratio[1]), rel=0.02)
-    assert pulls[0] < now < pulls[1]
 
 
 def test_a_helix_grips_the_cylinder_with_the_slope_of_its_energy_by_the_gap() -> None:

@@ -543,6 +543,11 @@ def test_the_robot_of_a_result_is_text_and_no_other_file(tmp_path: Path) -> None
         ("cross_validation", {"facts": np.array("[" * DEEP)}, "not JSON"),
         ("cross_validation", {"facts": np.array('{"sets": {"k": [7]}, "families": ["a", "b"], "unit": "m"}')}, "7 is no name"),
         ("cross_validation", {"facts": np.array('{"sets": [], "families": [], "unit": "m"}')}, "items"),
+        ("contact_path", {"force": np.full((2, 3), 1.0)}, "cone of friction|residual"),
+        ("contact_path", {"point": np.zeros((2, 3))}, "not where its robot touches"),
+        ("contact_path", {"status": np.array(["sticks", "glued"])}, "status must be one of"),
+        ("contact_path", {"dissipation": np.array([0.0, np.nan])}, "finite"),
+        ("contact_path", {"parameters": np.array([0.0])}, "dissipation must be"),
         ("ik_solution", {"steps": np.array(2.5)}, "must be an array of non-negative integers"),
     ],
 )

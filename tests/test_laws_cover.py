@@ -37,7 +37,6 @@ WITHOUT = {
     ),
     "dynamics.motion.MotionEnergy": _RESULT,
     "MotionState": _RESULT,
-    "statics.contact.contact.Contact": _RESULT,
     **dict.fromkeys((f"statics.contact.contact_path.Contact{name}" for name in ("Event", "Jump")), _RESULT),
     **dict.fromkeys((f"statics.contact.grasp.{name}" for name in ("ForceClosure", "PullOut")), _RESULT),
     "view.live.commands.Wanted": _RESULT,

@@ -32,9 +32,8 @@ pytestmark = pytest.mark.study
 
 FOLDER = CHECKOUT / "docs" / "pages"
 LIMITS = {"helix_growth": 3e6, "pcc_arm": 2e6, "inflatable_arm": 0.5e6, "wrist": 0.5e6, "ur5_bench": 2e6}
-LIMITS |= {"contact_arm": 0.5e6, "contact_pegs": 1.5e6}
 """Pages, and how many bytes each may have: they are committed."""
-BODIES = {"helix_growth": (2.0, 10.0), "pcc_arm": (0.3, 3.0), "contact_pegs": (0.3, 3.0)}
+BODIES = {"helix_growth": (2.0, 10.0), "pcc_arm": (0.3, 3.0)}
 """Pages that draw one body after the other, and how much more of it there may be at the end than at a quarter of the time."""
 
 
@@ -68,8 +67,6 @@ def coloured(picture: np.ndarray, name: str) -> np.ndarray:
         "pcc_arm": np.abs(blue - red) > 80,  # muscles that pull, and that push
         "inflatable_arm": warm_or_purple,
         "wrist": warm_or_purple,
-        "contact_arm": warm_or_purple,
-        "contact_pegs": (green - red > 25) | (red - blue > 25),  # pegs, and the body of the rod
         "ur5_bench": warm_or_purple | (picture.max(axis=2) < 60),  # the link, and the UR5's joints
     }[name]
 

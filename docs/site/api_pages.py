@@ -74,7 +74,6 @@ PAGES = {
             *_top("compliance", "elastostatic_jacobian", "critical_load", "estimate_load", "LoadEstimate"),
             *_top("post_buckling_branches", "EquilibriumBranch"),
             *_top("solve_imposed_displacement", "ImposedDisplacement"),
-            "softrobots.statics.contact.contact.Contact",
             *_top("follow_contact", "ContactPath"),
             *(f"softrobots.statics.contact.contact_path.{name}" for name in ("ContactEvent", "ContactJump")),
             *_top("contact_sensitivity", "locate_contact", "contact_wrench", "is_force_closure", "pull_out_force"),

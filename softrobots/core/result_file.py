@@ -70,8 +70,8 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
     last bit; JSON takes two to four times the space and is read without NumPy, too.
 
     Args:
-        result: A characterisation, equilibrium, imposed displacement, load estimate, IK solution, trajectory, motion,
-            vibration modes, workspace, workspace map, measurements, identification, cross-validation, or the branches
+        result: A characterisation, equilibrium, imposed displacement, load estimate, IK solution, trajectory, contact path,
+            motion, vibration modes, workspace, workspace map, measurements, identification, cross-validation, or the branches
             that `post_buckling_branches` returns.
         path: File to write; `.npz` is added if it has no suffix.
         overwrite: Replace an existing file.
@@ -98,17 +98,18 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
 
 
 def save_csv(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Save a trajectory, a motion or vibration modes as a CSV table in full precision: a line a waypoint, an instant, a mode.
+    """Save a trajectory, contact path, motion or vibration modes as a CSV table in full precision, a line a step.
 
     Columns of a trajectory: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y,
     tip_z` [m], `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for each motor and
     spring [rad] (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link, and the normal force on
     each obstacle that is touched. Those of a motion have their unit in their name: time, motors, springs, their velocities,
-    motor torques, tip, force on the tip and energies. So have those of modes: frequency, damping ratio, effective masses,
-    motion of the tip and of each coordinate.
+    motor torques, tip, force on the tip and energies. So have those of a contact path: parameter, work of
+    friction, tip, sum of the contact forces, joints; and those of modes: frequency, damping ratio, effective masses, motion
+    of the tip and of each coordinate.
 
     Args:
-        result: The trajectory, motion or modes.
+        result: The trajectory, contact path, motion or modes.
         path: File to write.
         overwrite: Replace an existing file.
 

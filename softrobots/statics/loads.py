@@ -12,7 +12,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
-from softrobots.core.errors import ParameterError
+from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel, check_model
@@ -173,6 +173,20 @@ def distributed_force(model: SoftModel, force_per_length: Any) -> dict[str, Floa
     if model.structure.constant_strain:
         lengths = 0.5 * (lengths + np.append(lengths[1:], 0.0))
     return {row.name: np.concatenate([share * force, np.zeros(3)]) for row, share in zip(rows, lengths.tolist(), strict=True)}
+
+
+def load_of_data(model: SoftModel, data: Any) -> Load:
+    """Return the load of plain data of a result file: wrenches, gravity and, if there is one, the environment.
+
+    Raises:
+        FileFormatError: If an obstacle names another file; other exceptions of readers mean that the data is none.
+    """
+    environment = None
+    if "environment" in data:
+        if any(isinstance(one.get("vertices"), str) for one in data["environment"]["obstacles"]):
+            raise FileFormatError("an obstacle of it is another file")
+        environment = Environment.from_dict(data["environment"])
+    return Load.of(model, wrench=data["wrenches"], gravity=data["gravity"], environment=environment)
 
 
 def check_no_contact(subject: Any, what: str) -> None:

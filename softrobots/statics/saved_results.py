@@ -17,7 +17,6 @@ from softrobots.core.checks import FloatArray, choice, finite_array, finite_numb
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
-from softrobots.environment.environment import Environment
 from softrobots.model.dry_friction import FrictionMemory
 from softrobots.model.friction_coordinates import memory_of, remembering
 from softrobots.model.loader import load_again, load_arguments
@@ -33,7 +32,7 @@ from softrobots.statics.imposed_displacement import ImposedDisplacement, imposed
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
 from softrobots.statics.load_estimation import LoadEstimate, estimate_at, packed_estimate
-from softrobots.statics.loads import Load
+from softrobots.statics.loads import Load, load_of_data
 from softrobots.statics.tip_goal import Goal, checked_orientation
 from softrobots.statics.tip_path.csv_columns import trajectory_table
 from softrobots.statics.trajectory import Trajectory
@@ -65,12 +64,7 @@ def unpack_model(fields: Mapping[str, Any]) -> tuple[SoftModel, Load]:
     springs = {str(name): (float(k), float(rest)) for name, (k, rest) in arguments["springs"].items()}
     muscles = arguments.get("muscles", "lengths")
     model = load_again(urdf, springs=springs, motors=arguments["motors"], tip=arguments["tip"], muscles=muscles)
-    environment = None
-    if "environment" in load:
-        if any(isinstance(one.get("vertices"), str) for one in load["environment"]["obstacles"]):
-            raise FileFormatError("an obstacle of it is another file")
-        environment = Environment.from_dict(load["environment"])
-    return model, Load.of(model, wrench=load["wrenches"], gravity=load["gravity"], environment=environment)
+    return model, load_of_data(model, load)
 
 
 def _pack_rows(equilibria: tuple[Equilibrium, ...], *, one_load: bool = True) -> dict[str, Any]:

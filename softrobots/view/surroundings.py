@@ -18,7 +18,6 @@ from softrobots.statics.equilibrium import Equilibrium
 from softrobots.view.mesh_triangles import Triangles
 
 _SHEET = 0.01  # thickness of the sheet that stands for a half-space, of its side
-_WITHIN = 0.995  # radius of a drawn capsule, of its own: just within the surface of the link, with which it would flicker
 _ROUND = (16, 32)  # rings and corners of the ends of a capsule
 
 
@@ -90,7 +89,7 @@ def drawn_capsules(model: SoftModel, q: FloatArray) -> tuple[DrawnObstacle, ...]
         pose[:3, 3] = 0.5 * (start + end)
         if length > 0.0:
             pose[:3, :3] = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), (end - start) / length).matrix()
-        drawn.append(DrawnObstacle(one.link, _capsule(_WITHIN * one.radius, length), pose))
+        drawn.append(DrawnObstacle(one.link, _capsule(one.radius, length), pose))
     return tuple(drawn)
 
 

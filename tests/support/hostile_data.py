@@ -321,6 +321,13 @@ def results() -> dict[str, Any]:
             np.array([[0.1, 0.2], [0.3, 0.4]]), tip_position=[[1.0, 2.0, np.nan], [3.0, 4.0, 5.0]], std=0.1, labels=["a", "b"]
         ),
         "identification": sr.identify(robot, rows, ("stiffness", "base.position.z"), validation="b"),
+        "contact_path": sr.follow_contact(
+            model,
+            (0.3, -0.2, 0.3),
+            [(0, 0, -20), (0, 9, -20)],
+            environment=sr.Environment([sr.HalfSpace((0, 0, 1), -0.1)]),
+            friction=0.3,
+        ),
         "cross_validation": sr.CrossValidation(
             {"k": ("stiffness",), "all": ("stiffness", "base.position.x")}, ("a", "b"), np.array([[2.0, 3.0], [1.0, 1.5]]), "m"
         ),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 
 import softrobots as sr
@@ -47,3 +48,19 @@ def ladder(length: float, angle: float, radius: float, soft: float) -> sr.SoftMo
     ]
     capsules = [("foot", "0 0 0", "0 0 0", radius), ("tip", "0 0 0", "0 0 0", radius)]
     return robot(("base", "a", "b", "beam", "foot", "middle", "tip"), joints, capsules)
+
+
+def rope(links: int, wrapped: float, radius: float, thickness: float, bending: float, guide: float) -> sr.SoftModel:
+    """A chain of links that lie around the top of a cylinder along y below the origin, each touching it in its middle.
+
+    Its start slides along x on a spring; hinges have the stiffness of a rod, which at rest is bent as the cylinder.
+    """
+    turn = wrapped / links
+    length = 2.0 * (radius + thickness) * math.tan(0.5 * turn)
+    names, joints = ["base", "link_0"], [joint("guide", "prismatic", "base", "link_0", "1 0 0", guide)]
+    for number in range(1, links + 1):
+        place = f'xyz="{(0.5 if number == 1 else 1.0) * length} 0 0" rpy="0 {turn} 0"'
+        joints.append(joint(f"hinge_{number}", "revolute", names[-1], f"link_{number}", "0 1 0", bending / length, place))
+        names.append(f"link_{number}")
+    joints.append(joint("end", "fixed", names[-1], "tip", "", origin=f'xyz="{length} 0 0"'))
+    return robot([*names, "tip"], joints, [(name, "0 0 0", f"{length} 0 0", thickness) for name in names[2:]])

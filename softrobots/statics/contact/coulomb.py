@@ -168,6 +168,25 @@ def solve_step(step: Step, start: FloatArray, coefficient: float) -> tuple[Balan
     return None, spent
 
 
+def balance_of(step: Step, y: FloatArray, near: NearContacts, normal: FloatArray, friction: FloatArray, sticks: Any) -> Balance:
+    """Return a state whose forces are known, at the coordinates that the step was asked last.
+
+    Args:
+        step: The robot.
+        y: Elastic coordinates, shape (n,).
+        near: The contacts there.
+        normal: Normal forces, shape (m,) [N].
+        friction: Friction, shape (m, 2) [N].
+        sticks: Which contacts stick, shape (m,), bool.
+    """
+    residual, tangent, allowed = step.residual(normal, friction)
+    size, none = np.linalg.norm(friction, axis=1), np.zeros(len(normal))
+    way = friction / np.maximum(size, 1e-300)[:, None]
+    slips = (size > 0.0) & ~sticks
+    laws = Laws(normal > 0.0, sticks, slips, way, none, np.zeros_like(friction), np.sqrt(step.stiffness), none, none, 0.0)
+    return Balance(y, near, normal, friction, residual, tangent, allowed, laws)
+
+
 def _balance(
     step: Step, y: FloatArray, normal: FloatArray, friction: FloatArray, coefficient: float, scale: FloatArray
 ) -> Balance | None:

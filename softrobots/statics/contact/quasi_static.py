@@ -23,8 +23,10 @@ from softrobots.statics.contact.last_state import MARGIN, Given, Sliding
 from softrobots.statics.contact.sliding import SlidingRobot
 from softrobots.statics.equilibrium_result import Equilibrium
 
-FAR = 0.2
-"""Change of the springs that is no small step, in coordinates in which their energy is half the square [rad]."""
+FAR = 0.04
+"""Change of the springs that is no small step [rad]; a loss of stability that is over within less is not seen."""
+
+_FAR_MOVING = 0.2  # the same in a step of overdamped motion
 
 _MOST_MOMENTS = 400  # steps of the overdamped motion
 _STRONGEST = 1e6  # brake that is given up at, over the stiffness of the springs
@@ -93,7 +95,7 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
     for _ in range(_MOST_MOMENTS):
         there = settle(given, sliding, here, brake)
         moved = np.inf if there is None else change(model, there.q_springs, here)
-        if there is None or moved > FAR:
+        if there is None or moved > _FAR_MOVING:
             brake *= 4.0
             if brake > _STRONGEST:
                 return None
