@@ -303,6 +303,19 @@ def test_work_of_a_growing_force_is_stored_while_it_slides(arm: sr.SoftModel) ->
     assert work == pytest.approx(stored[1] - stored[0], rel=1e-9)
 
 
+def test_a_start_deep_inside_finds_its_way_out(one_link: sr.SoftModel) -> None:
+    """Relaxed, the link goes through a slab that ends 0.12 m and 0.32 m beside it: the way out is aside."""
+    slab = Box((0.2, 0.44, 0.6), (0.45, -0.1, 0.0))
+    found = sr.solve_equilibrium(one_link, (0, 0), (0, -30, 0), environment=Environment([slab]))
+    (contact,) = found.contacts
+    assert found.stable
+    assert abs(found.q_springs[0]) > 0.3  # 0.12 m and the radius, on a lever of 0.5 m; more on the other side
+    assert contact.normal_force > 0.0
+    assert (
+        abs(box_distance(slab.size, slab.position, np.eye(3), np.array([HINGE, 0, 0]), end_of(found.q_springs)) - BODY) < 1e-9
+    )
+
+
 # --- Whatever robot
 
 spheres = st.tuples(st.floats(0.05, 0.3), st.floats(0.3, 1.0), directions, st.floats(-0.3, 0.6))

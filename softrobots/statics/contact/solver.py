@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from softrobots.core.checks import FloatArray
 from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.contact.descent import BALANCED, ContactSearch, Near
 from softrobots.statics.contact.touch import TOUCHING, ForceTable, resting_forces
-from softrobots.statics.elastic_state import ElasticProblem, ElasticState
+from softrobots.statics.elastic_state import ElasticProblem, ElasticState, norm
 from softrobots.statics.stability import is_stable
 
+_WAYS, _ASIDE = 2, 0.7  # motions that change gaps most, by which a stuck search starts again; and how far [rad]
 _FIRST_GROWTH, _LEAST_GROWTH = 0.25, 1e-3  # parts of the load that are added at once
 
 
 def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[ElasticState, int, bool]:
-    """Find an equilibrium in contact, from a start or, if that fails, under a load that grows from zero.
+    """Find an equilibrium in contact, from a start or, if that fails, from springs bent aside or under a load that grows.
 
     Args:
         problem: The robot under a load that has a potential, with an environment.
@@ -29,6 +32,8 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
         return problem.state(start), 1, False
     first = search.repaired(first)
     found, stable = search.descend(first)
+    if found.error > BALANCED and found.touch.penetration > TOUCHING * problem.model.reach and not search.blocked(found):
+        found, stable = _from_aside(search, start, found)
     if found.error > BALANCED and not search.blocked(found):
         grown, stable = _grown(search, first)
         found = grown if grown is not None and grown.error < found.error else found
@@ -38,6 +43,22 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
     if least is not None:
         return least.state, search.spent, is_stable(problem.model, problem.load, least.state, problem.tolerance)
     return found.state, search.spent, stable
+
+
+def _from_aside(search: ContactSearch, start: FloatArray, stuck: Near) -> tuple[Near, bool]:
+    """Descend from springs bent aside, where the way out of an obstacle ended inside; the best, and whether it is stable."""
+    _, _, right = np.linalg.svd(stuck.touch.rows / np.sqrt(search.problem.model.stiffness))
+    for direction in right[:_WAYS] / np.sqrt(search.problem.model.stiffness):
+        for sign in (1.0, -1.0):
+            if search.spent >= search.most:
+                return stuck, False
+            begin = search.near(start + sign * _ASIDE / norm(direction) * direction)
+            if begin is None:
+                continue
+            found, stable = search.descend(search.repaired(begin))
+            if found.error <= BALANCED:
+                return found, stable
+    return stuck, False
 
 
 def _of_least_norm(search: ContactSearch, found: Near) -> Near | None:
