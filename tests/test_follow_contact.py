@@ -230,6 +230,20 @@ def test_a_path_is_saved_and_loaded_with_its_friction(tmp_path: Path) -> None:
         sr.save_result(path.equilibria[-1], tmp_path / "one.npz")
 
 
+def test_an_elbow_that_two_springs_cannot_keep_in_place_is_turned_on_a_table(arm: sr.SoftModel) -> None:
+    """Three conditions of sticking on two springs: the elbow follows the motor once friction gives way, mu N against it."""
+    table = sr.Environment([sr.HalfSpace((0, 0, 1), -0.1)])
+    motors = np.column_stack([np.linspace(0.0, 0.2, 9), np.full(9, -0.1), np.full(9, 0.15)])
+    path = sr.follow_contact(arm, motors, (0, 0, -15), environment=table, friction=0.4)
+    (elbow,) = path.contacts[-1]
+    assert elbow.status == "slips"
+    assert abs(elbow.gap) < 1e-9
+    across = elbow.force - elbow.normal_force * elbow.normal
+    assert np.linalg.norm(across) == pytest.approx(0.4 * elbow.normal_force, rel=1e-9)
+    assert across[1] < 0.0  # it is dragged along +y
+    assert all(found.residual <= found.tolerance for found in path.equilibria)
+
+
 REFUSED = {
     "rows": (lambda: sr.follow_contact(block(), [[0.0], [1.0]], np.zeros((3, 3)), environment=FLOOR), "one row, or 3"),
     "environment": (lambda: sr.follow_contact(block(), [0.0], environment=None), "an Environment"),

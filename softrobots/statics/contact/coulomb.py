@@ -11,7 +11,8 @@ where :math:`\Pi_a` is the nearest point of the disk of radius `a` (P. Alart, A.
 contact problems prone to Newton like solution methods, Computer Methods in Applied Mechanics and Engineering 92, 1991, section
 4; implicit in time: the friction at the end of the step opposes the sliding in it). Without friction only `y` and
 :math:`\lambda_n` are left. The contacts that press (:math:`\lambda_n > \rho g`) stand in one dense system, which is not
-symmetric; where it is singular (more contacts than the robot has coordinates) the smallest change of forces is taken.
+symmetric; where it is singular (more contacts than the robot has coordinates) the smallest change of forces is taken,
+and sliding that no motion of the springs can prevent (an elbow of rigid links that is turned) is let be, up to `FORCED`.
 """
 
 from __future__ import annotations
@@ -38,6 +39,11 @@ _MOTIONLESS = 1e-6  # motion of a point that no spring can move, over the reach 
 _OPENING = 100.0  # weight of a gap against a force, over the stiffness of the springs, where contacts are taken as open
 _FULL_STEPS = 12  # Newton steps before they are halved
 _HALVINGS = 5  # of a Newton step
+FORCED = 1e-4
+"""Largest sliding in a step of a contact that sticks, relative to the reach, where no motion of the springs can prevent it."""
+
+_STILL = 1e-10  # [rad], Newton step after which no motion of the springs brings the equations any nearer
+_FIRST = 1e4  # weight of gaps over sliding, where both cannot be zero
 _RANK = 1e-12  # singular values below this, relative to the largest, are none
 
 
@@ -149,11 +155,13 @@ def solve_step(step: Step, start: FloatArray, coefficient: float) -> tuple[Balan
         here, first = _balance(step, start, np.zeros(0), np.zeros((0, 2)), coefficient, step.stiffness), spent
         spent += 1
         while here is not None and spent < first + most:
-            if _converged(step, here, coefficient):
+            if _converged(step, here):
                 return here, spent
             change = _newton_change(here, coefficient)
             if change is None:
                 break
+            if float(np.linalg.norm(change[0])) <= _STILL and _converged(step, here, FORCED):
+                return here, spent
             scale = np.maximum(step.stiffness, here.tangent.diagonal())
             share = min(1.0, LARGEST_STEP / max(float(np.linalg.norm(change[0])), 1e-300))
             base, there = step.mark(), None
@@ -218,15 +226,15 @@ def _balance(
     return Balance(y, near, normal, friction, residual, tangent, allowed, laws)
 
 
-def _converged(step: Step, here: Balance, coefficient: float) -> bool:
-    """Whether balance, gaps, sliding and friction are within their tolerances."""
+def _converged(step: Step, here: Balance, sliding: float = GAP) -> bool:
+    """Whether balance, gaps, sliding (relative to the reach) and friction are within their tolerances."""
     near, laws, normal = here.contacts, here.laws, here.normal
     force = max(CONE * float(normal.max(initial=0.0)), here.allowed / step.reach)
     open_gaps = np.where(laws.pressed, np.abs(near.gaps), -near.gaps)
     return bool(
         np.linalg.norm(here.residual) <= here.allowed
         and open_gaps.max(initial=0.0) <= GAP * step.reach
-        and np.abs(near.sliding[laws.sticks]).max(initial=0.0) <= GAP * step.reach
+        and np.abs(near.sliding[laws.sticks]).max(initial=0.0) <= sliding * step.reach
         and np.abs(laws.broken[~laws.sticks]).max(initial=0.0) <= force
         and np.abs(normal[~laws.pressed]).max(initial=0.0) <= force
         and normal.min(initial=0.0) >= -force
@@ -267,6 +275,8 @@ def _newton_change(here: Balance, coefficient: float) -> tuple[FloatArray, Float
         matrix[rows, :n] = turn @ moves
         matrix[rows, place[np.searchsorted(pressed, one)]] = -coefficient * ratio * way
         right[rows] = -laws.broken[one] / laws.unit_friction[one]
+    matrix[place] *= _FIRST
+    right[place] *= _FIRST
     try:
         change = np.linalg.lstsq(matrix, right, rcond=_RANK)[0]
     except np.linalg.LinAlgError:
