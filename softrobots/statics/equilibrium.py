@@ -110,6 +110,9 @@ def _hint(best: Equilibrium, state: ElasticState) -> str:
     overloaded = near_largest_moment(best.model, best.link_moments)
     if overloaded:
         return f"; {overloaded}; solve_imposed_displacement finds equilibria there for a given displacement"
+    if best.environment is not None:
+        names = ", ".join(map(repr, best.environment.names))
+        return f"; among {names} no step lowers the energy; follow_contact goes by small steps from an equilibrium"
     return (
         "" if best.conservative else "; under a world-fixed moment the load grows, then the moments alone, to a turning point"
     )
