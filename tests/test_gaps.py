@@ -324,15 +324,11 @@ def test_a_core_within_an_obstacle_is_pushed_out(kind: str) -> None:
     assert np.allclose(field.at((points - depths[:, None] * normals)[inside], which[inside])[0], 0.0, atol=1e-12)
 
 
-def test_gaps_follow_a_moving_obstacle_and_its_material(arm: sr.SoftModel) -> None:
-    """A turning and rising box: velocity of the gaps by differences; the slip of its surface by hand."""
+def test_material_points_follow_a_moving_obstacle(arm: sr.SoftModel) -> None:
+    """A turning and rising box: the slip of its surface by hand."""
     environment = sr.Environment([sr.Box((0.3, 0.2, 0.15), POSITION, ROTATION, pose=rising)])
-    q, step = np.array([0.1, -0.2, 0.05, 0.1, 0.3, 0.0, -0.1]), 1e-5
-    before, gaps, after = (Surroundings(arm, environment.at(0.4 + x)).at(q, 10.0) for x in (-step, 0.0, step))
-    slopes = (after.values - before.values) / (2.0 * step)
-    assert gaps.keys == before.keys == after.keys
-    smooth = gaps.features <= 2
-    assert np.allclose(gaps.drift(environment.rates(0.4))[smooth], slopes[smooth], atol=1e-8)
+    q = np.array([0.1, -0.2, 0.05, 0.1, 0.3, 0.0, -0.1])
+    gaps = Surroundings(arm, environment.at(0.4)).at(q, 10.0)
     there = Surroundings(arm, environment.at(0.7)).at(q + 0.1, 10.0)
     on_robot, on_obstacle = there.places_of(gaps.material(np.arange(len(gaps))))
     move = rising(0.7) * rising(0.4).inverse()

@@ -25,11 +25,12 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.compiled.sweeps import TargetGrid
-from softrobots.constant_curvature.screws import Screw, skew
+from softrobots.constant_curvature.screws import Screw
 from softrobots.constant_curvature.strain_chain import in_range, joint_positions
 from softrobots.constant_curvature.stumpff import stumpff
 from softrobots.core import checks, errors
 from softrobots.core.files import csv_text, write_text
+from softrobots.core.vectors import skew
 from softrobots.description.renaming import prefix_names, shift_segments, used_names
 from softrobots.model.actuators import Actuators
 from softrobots.model.muscle_lengths import MuscleLengths

@@ -16,9 +16,10 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 from scipy.spatial.transform import Rotation
 
-from softrobots.constant_curvature.screws import Screw, skew
+from softrobots.constant_curvature.screws import Screw
 from softrobots.constant_curvature.strain_chain import JOINTS, SectionChain, in_range, joint_positions
 from softrobots.constant_curvature.stumpff import stumpff
+from softrobots.core.vectors import skew
 from tests.support.oracles import central_difference
 from tests.support.screw_motions import H, exact_screw, exact_stumpff, rotation, screw_matrix
 from tests.support.tables import each_row

@@ -18,18 +18,11 @@ import numpy as np
 
 from softrobots.constant_curvature.stumpff import stumpff
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import skew
 
 _UNITS = np.eye(3)
 _AXIS = _UNITS[2]
 _CROSS_AXIS = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 0.0]])  # columns e_j x e_z
-
-
-def skew(vectors: FloatArray) -> FloatArray:
-    """Return the cross-product matrices `[v]`, `[v] u = v x u`, shape (..., 3, 3), of vectors of shape (..., 3)."""
-    matrices = np.zeros((*vectors.shape, 3))
-    matrices[..., 2, 1], matrices[..., 0, 2], matrices[..., 1, 0] = vectors[..., 0], vectors[..., 1], vectors[..., 2]
-    matrices[..., 1, 2], matrices[..., 2, 0], matrices[..., 0, 1] = -vectors[..., 0], -vectors[..., 1], -vectors[..., 2]
-    return matrices
 
 
 class Screw:

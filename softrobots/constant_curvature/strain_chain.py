@@ -21,8 +21,9 @@ from functools import cached_property
 
 import numpy as np
 
-from softrobots.constant_curvature.screws import Screw, skew
+from softrobots.constant_curvature.screws import Screw
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import skew
 
 JOINTS = ("u1", "u2", "c", "r1", "r2", "r3")
 """Joints of a section, base to tip: two of the universal joint, the chord, three of the spherical joint."""

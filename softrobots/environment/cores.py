@@ -10,8 +10,8 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import skew
 from softrobots.environment.capsules import RobotCapsule, robot_capsules
-from softrobots.environment.distance_fields import skew
 from softrobots.model.soft_model import SoftModel, check_model
 
 SAME_POINT = 1e-9

@@ -19,8 +19,6 @@ ON_BORDER = 1e-9
 """Distance beyond a face, over that from the body, below which a point belongs to the face; exact at crossed borders."""
 _TINY = 1e-300
 _RADIAL, _AXIS = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
-_NEXT, _LAST = np.array([1, 2, 0]), np.array([2, 0, 1])
-_PRODUCTS = np.cross(np.eye(3)[:, None], np.eye(3)).swapaxes(1, 2).reshape(3, 9)  # of the axes
 
 
 class Field(Protocol):
@@ -41,16 +39,6 @@ class Field(Protocol):
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Shares `s` of the way, shape (m, k), where `start + s span` crosses between features; any number if it does not."""
-
-
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross products of rows, shape (..., 3); several times faster than `np.cross` on few."""
-    return np.asarray(a.take(_NEXT, -1) * b.take(_LAST, -1) - a.take(_LAST, -1) * b.take(_NEXT, -1))
-
-
-def skew(vectors: FloatArray) -> FloatArray:
-    """Matrices of the products `v x` of rows, shape (m, 3), as shape (m, 3, 3)."""
-    return np.asarray(vectors.dot(_PRODUCTS)).reshape(-1, 3, 3)
 
 
 class HalfSpaces(NamedTuple):

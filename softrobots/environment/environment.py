@@ -8,9 +8,7 @@ from dataclasses import dataclass, fields, replace
 from functools import cached_property
 from typing import Any
 
-import numpy as np
-
-from softrobots.core.checks import FloatArray, finite_number, instance_of
+from softrobots.core.checks import finite_number, instance_of
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
 from softrobots.core.files import as_path
 from softrobots.core.yaml_text import yaml_of
@@ -20,9 +18,6 @@ from softrobots.environment.world_files import PLAIN_DATA, read_obstacles, read_
 
 KINDS: dict[str, type[Obstacle]] = {kind.kind: kind for kind in (HalfSpace, Sphere, Box, Cylinder, Capsule, Mesh)}
 """Obstacles by their kind in plain data."""
-
-_POSE_STEP = 1e-5
-"""Relative step of the central difference of a pose: truncation and rounding are both about 1e-10."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -124,26 +119,6 @@ class Environment:
         chosen = self[name]
         after = chosen.moved(transform)
         return replace(self, obstacles=tuple(after if one is chosen else one for one in self.obstacles))
-
-    def rates(self, parameter: float) -> FloatArray:
-        """Velocity of each obstacle per parameter, shape (n, 6): of its point at the origin of the world, then angular.
-
-        Central differences of the poses, whose step is 1e-5 of the parameter, and at least 1e-5; zero for fixed obstacles.
-
-        Raises:
-            ParameterError: If the parameter is no finite number, or a pose no rigid transform.
-        """
-        number = finite_number("parameter", parameter)
-        step = _POSE_STEP * max(abs(number), 1.0)
-        rows = np.zeros((len(self), 6))
-        for row, one in zip(rows, self.obstacles, strict=True):
-            if one.moves:
-                before, here, after = (one.at(value).pose for value in (number - step, number, number + step))
-                slope = (after - before) / (2.0 * step)
-                spin = slope[:3, :3] @ here[:3, :3].T
-                row[3:] = 0.5 * np.array([spin[2, 1] - spin[1, 2], spin[0, 2] - spin[2, 0], spin[1, 0] - spin[0, 1]])
-                row[:3] = slope[:3, 3] - np.cross(row[3:], here[:3, 3])
-        return rows
 
     def to_dict(self) -> dict[str, Any]:
         """Return it as plain data, for JSON or YAML.

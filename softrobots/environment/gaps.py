@@ -20,9 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import cross, skew
 from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
 from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores, cores_of
-from softrobots.environment.distance_fields import Field, HalfSpaces, cross, skew
+from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
 from softrobots.environment.self_contact import relative_curvature, self_contact_pairs
@@ -210,22 +211,6 @@ class Gaps:
             found.append(np.array(new))
             weights.append(float(forces[row]) * np.array(each))
 
-    def drift(self, rates: FloatArray) -> FloatArray:
-        """Velocity of the gaps while obstacles move and the robot stands, shape (m,).
-
-        Args:
-            rates: Velocities of the obstacles, shape (n, 6); see `Environment.rates`.
-
-        Returns:
-            Derivatives of the gaps by the parameter of the poses.
-        """
-        mine = self.obstacles < len(rates)
-        moving = (
-            np.where(mine[:, None], rates[np.where(mine, self.obstacles, 0)], 0.0) if len(rates) else np.zeros((len(self), 6))
-        )
-        speeds = moving[:, :3] + cross(moving[:, 3:], self.obstacle_points)
-        return -np.asarray((speeds * self.normals).sum(axis=1))
-
     def material(self, rows: Any) -> MaterialPoints:
         """Return the nearest points of the two surfaces at some candidates as points of their materials.
 
@@ -233,7 +218,7 @@ class Gaps:
             rows: Candidates, shape (k,), integers.
 
         Returns:
-            The points; `Surroundings.world_points` says where they are in another configuration.
+            The points; `places_of` says where they are in another configuration.
         """
         capsules, obstacles = self.capsules[rows], self.obstacles[rows]
         joints = self.places.placements[self._cores.carrier[capsules]]

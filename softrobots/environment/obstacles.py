@@ -18,6 +18,7 @@ from softrobots.core.checks import (
     unit_vector,
 )
 from softrobots.core.errors import ParameterError
+from softrobots.core.vectors import axes_along
 
 Pose = Callable[[float], Any]
 """A pose `transform_obstacle_to_world` of a parameter (time, stroke, ...): a `pinocchio.SE3` or an array, shape (4, 4)."""
@@ -169,11 +170,7 @@ class HalfSpace(Obstacle):
     @property
     def own_transform(self) -> FloatArray:
         """The point of the plane nearest to the origin, with z along the normal; shape (4, 4)."""
-        helper = np.eye(3)[int(np.argmin(np.abs(self.normal)))]
-        across = np.cross(self.normal, helper)
-        across /= np.linalg.norm(across)
-        axes = np.column_stack([across, np.cross(self.normal, across), self.normal])
-        return _transform(axes, self.offset * self.normal)
+        return _transform(axes_along(self.normal), self.offset * self.normal)
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,9 @@ import numpy as np
 from scipy.optimize import nnls
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import cross
 from softrobots.environment.convex_mesh import Hull
-from softrobots.environment.distance_fields import ON_BORDER, cross
+from softrobots.environment.distance_fields import ON_BORDER
 
 _TOLERANCE = 1e-12  # of Coal; the nearest point is then within 1e-6 of the size
 _TOUCHING = 1e-7  # of the size: faces that hold the nearest point

@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import axes_along, cross
 from softrobots.environment.cores import CorePlaces, Cores
-from softrobots.environment.distance_fields import ON_BORDER, RoundedBoxes, cross
+from softrobots.environment.distance_fields import ON_BORDER, RoundedBoxes
 from softrobots.environment.nearest_points import core_points
 from softrobots.model.soft_model import SoftModel
 
@@ -28,12 +29,9 @@ def own_capsules(cores: Cores, places: CorePlaces) -> RoundedBoxes:
     """Return the capsules of a robot in a configuration as obstacles to each other."""
     along = places.spans / np.maximum(cores.lengths, 1e-300)[:, None]
     along[cores.lengths == 0.0] = [0.0, 0.0, 1.0]
-    across = cross(along, np.eye(3)[np.abs(along).argmin(axis=1)])
-    across /= np.sqrt((across * across).sum(axis=1))[:, None]
-    axes = np.stack([across, cross(along, across), along], axis=2)
     halves = np.zeros((cores.count, 3))
     halves[:, 2] = 0.5 * cores.lengths
-    return RoundedBoxes(axes, places.ends.mean(axis=1), halves, cores.radii)
+    return RoundedBoxes(axes_along(along), places.ends.mean(axis=1), halves, cores.radii)
 
 
 def self_contact_pairs(model: SoftModel, cores: Cores) -> Any:
@@ -112,10 +110,6 @@ def relative_curvature(
     one, two = pair
     distance = max(distance, _CROSSING)
     other = point - distance * normal
-    first = np.eye(3)[int(np.abs(normal).argmin())]
-    first = first - (first @ normal) * normal
-    first /= np.sqrt(first @ first)
-    across = np.stack([first, cross(normal, first)])
     moves = cores.moves
 
     def row(capsule: int, force: FloatArray, at: FloatArray, couple: Any = 0.0) -> FloatArray:
@@ -124,7 +118,7 @@ def relative_curvature(
     def relative(force: FloatArray) -> FloatArray:
         return row(one, force, point) - row(two, force, other)
 
-    rows, weights = [relative(direction) for direction in across], [1.0 / distance] * 2
+    rows, weights = [relative(direction) for direction in axes_along(normal)[:, :2].T], [1.0 / distance] * 2
     tangents, turns = [], []
     nothing = np.zeros(3)
     if slides:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import cross
 from softrobots.environment.candidates import INSIDE
-from softrobots.environment.distance_fields import HalfSpaces, cross
+from softrobots.environment.distance_fields import HalfSpaces
 from softrobots.environment.gaps import Gaps
 
 

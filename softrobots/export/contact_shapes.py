@@ -12,12 +12,9 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 from typing import Any
 
-import numpy as np
-import pinocchio as pin
-
-from softrobots.core.checks import FloatArray, non_negative_number, read_only
+from softrobots.core.checks import non_negative_number, read_only
 from softrobots.core.errors import ParameterError
-from softrobots.description.rigid_tree import Placement, RigidTree, Shape
+from softrobots.description.rigid_tree import Placement, RigidTree, Shape, capsule_shape
 from softrobots.description.urdf_tags import CapsuleTag
 from softrobots.environment.capsules import capsule_tags
 from softrobots.environment.convex_mesh import Mesh
@@ -86,7 +83,7 @@ def with_capsules(tree: RigidTree, capsules: Sequence[CapsuleTag]) -> RigidTree:
     """Return the robot with its capsules in place of its collision shapes."""
     shapes: dict[str, list[Shape]] = {}
     for capsule in capsules:
-        shapes.setdefault(capsule.link, []).append(_capsule(capsule))
+        shapes.setdefault(capsule.link, []).append(capsule_shape(capsule))
     return replace(tree, bodies=tuple(replace(body, collisions=tuple(shapes.get(body.name, ()))) for body in tree.bodies))
 
 
@@ -99,14 +96,6 @@ def _apart(model: SoftModel) -> tuple[tuple[str, str], ...]:
     return tuple((one, other) for one, other in pairs if touching[frozenset((one, other))] < capsules[one] * capsules[other])
 
 
-def _capsule(tag: CapsuleTag) -> Shape:
-    start, end = np.array(tag.start), np.array(tag.end)
-    length = float(np.linalg.norm(end - start))
-    if length == 0.0:
-        return Shape("sphere", (tag.radius,), Placement(read_only(start)))
-    return Shape("capsule", (tag.radius, length), Placement(read_only(0.5 * (start + end)), _turned_to((end - start) / length)))
-
-
 def _shape(obstacle: Obstacle) -> Shape:
     transform = obstacle.transform_to_world
     placement = Placement(read_only(transform[:3, 3].copy()), read_only(transform[:3, :3].copy()))
@@ -114,8 +103,3 @@ def _shape(obstacle: Obstacle) -> Shape:
     size: Any = obstacle.size if isinstance(obstacle, Box) else (1.0, 1.0, 1.0) if isinstance(obstacle, Mesh) else sizes
     kind = "plane" if isinstance(obstacle, HalfSpace) else obstacle.kind
     return Shape(kind, tuple(float(value) for value in size if value is not None), placement, _COLOUR)
-
-
-def _turned_to(axis: FloatArray) -> FloatArray:
-    """A rotation that turns z to a unit axis."""
-    return read_only(np.asarray(pin.Quaternion.FromTwoVectors(np.array([0.0, 0.0, 1.0]), axis).toRotationMatrix()))

@@ -20,7 +20,7 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
-from softrobots.identification.derivatives.loaded_tree import cross
+from softrobots.core.vectors import cross
 from softrobots.identification.derivatives.row_vibration import VIBRATION, RowVibration
 from softrobots.identification.friction_derivatives import friction_loads, slopes_of_course
 from softrobots.identification.measured_robot import frame_of, load_cases, loads_on

@@ -18,6 +18,7 @@ import pinocchio as pin
 from softrobots.constant_curvature.strain_chain import JOINTS, STRAINS
 from softrobots.core.checks import LARGEST, FloatArray, read_only
 from softrobots.core.errors import DescriptionError
+from softrobots.core.vectors import axes_along
 from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, Element, SerialChain
 from softrobots.model.springs import SpringGroup
 from softrobots.model.structure import Structure
@@ -177,14 +178,7 @@ def _axes(model: Any, number: int, neutral: FloatArray) -> tuple[bool, FloatArra
             f"joint {model.names[number]} of {model.name} is a {joint.shortname()}; compiled solvers take revolute, continuous "
             "and prismatic joints"
         )
-    return slides, _with_z(_snapped((motion[:3] if slides else motion[3:]).reshape(3)))
-
-
-def _with_z(axis: FloatArray) -> FloatArray:
-    """Right-handed axes with z along a unit vector, shape (3, 3); a signed permutation if that is along x, y or z."""
-    y = np.cross(axis, np.eye(3)[int(np.argmin(np.abs(axis)))])
-    y /= np.linalg.norm(y)
-    return np.stack([np.cross(y, axis), y, axis], axis=1)
+    return slides, axes_along(_snapped((motion[:3] if slides else motion[3:]).reshape(3)))
 
 
 def _placed(placement: Any, axes: FloatArray) -> tuple[FloatArray, FloatArray]:

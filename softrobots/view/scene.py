@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import axes_along
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.vibration import ModeSwing
 from softrobots.environment.environment import Environment
@@ -67,10 +68,8 @@ class Arrow(NamedTuple):
         if size <= _NO_FORCE:
             return None
         along = force / size
-        across = np.cross(along, np.eye(3)[int(np.argmin(np.abs(along)))])
-        across /= np.linalg.norm(across)
         pose = np.eye(4)
-        pose[:3, :3] = np.column_stack([across, along, np.cross(across, along)])
+        pose[:3, :3] = axes_along(along)[:, [1, 2, 0]]
         pose[:3, 3] = point
         return cls(pose, size, of_contact)
 

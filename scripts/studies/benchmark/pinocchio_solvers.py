@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.constant_curvature.screws import skew
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import skew
 from softrobots.model.soft_model import SoftModel
 
 TOLERANCE = 1e-10

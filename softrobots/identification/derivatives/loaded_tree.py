@@ -22,18 +22,10 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import cross, skew
 from softrobots.model.soft_model import SoftModel
 
-_SKEW = np.array([[0, 0, 0, 0, 0, -1, 0, 1, 0], [0, 0, 1, 0, 0, 0, -1, 0, 0], [0, -1, 0, 1, 0, 0, 0, 0, 0]], dtype=np.float64)
 _IDENTITY = np.eye(4)
-_MANY = 2000  # numbers, above which NumPy's cross product is faster
-
-
-def cross(a: FloatArray, b: FloatArray) -> FloatArray:
-    """Cross product of vectors of shapes (..., 3) that broadcast."""
-    if a.size + b.size > _MANY:
-        return np.cross(a, b)
-    return np.asarray(((a @ _SKEW).reshape(*a.shape, 3) @ b[..., None])[..., 0])
 
 
 class Topology(NamedTuple):
@@ -68,7 +60,7 @@ def topology(model: SoftModel) -> Topology:
     columns = np.asarray(columns).reshape(6, n)
     axes = np.array([data.oMi[i + 1].actInv(pin.Motion(columns[:, i])).vector for i in range(n)]).reshape(n, 6)
     motions = np.zeros((3, n, 4, 4))
-    motions[0, :, :3, :3] = (axes[:, 3:] @ _SKEW).reshape(n, 3, 3)
+    motions[0, :, :3, :3] = skew(axes[:, 3:])
     motions[1] = motions[0] @ motions[0]
     motions[2, :, :3, 3] = axes[:, :3]  # a joint turns or slides
     return Topology(tuple(jumps), parents, beyond, axes, motions)
