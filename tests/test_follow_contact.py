@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
@@ -242,6 +243,23 @@ def test_an_elbow_that_two_springs_cannot_keep_in_place_is_turned_on_a_table(arm
     assert np.linalg.norm(across) == pytest.approx(0.4 * elbow.normal_force, rel=1e-9)
     assert across[1] < 0.0  # it is dragged along +y
     assert all(found.residual <= found.tolerance for found in path.equilibria)
+
+
+def test_contact_under_a_moment_fixed_in_the_world_is_balanced(arm: sr.SoftModel) -> None:
+    """Such a load has no energy: torques of springs, load and contact are reckoned here from Pinocchio's Jacobian."""
+    wrench, motors = np.array([0.0, 0.0, -20.0, 3.0, 2.0, -4.0]), (0.3, 0.2, -0.5)
+    path = sr.follow_contact(arm, motors, wrench=wrench, environment=sr.Environment([sr.HalfSpace((0, 0, 1), -0.1)]))
+    found = path.equilibria[-1]
+    (contact,) = found.contacts
+    assert not found.conservative
+    assert contact.normal_force > 1.0
+    robot, data = arm.pinocchio, arm.pinocchio.createData()
+    jacobian = pin.computeFrameJacobian(robot, data, found.q, arm.frame_id(arm.tip), pin.ReferenceFrame.LOCAL_WORLD_ALIGNED)
+    lever = contact.point - found.tip_position  # the contact is on the link that carries the tip
+    assert contact.link == "link_2"
+    pressed = np.concatenate([contact.force, np.cross(lever, contact.force)])
+    torque = (jacobian.T @ (wrench + pressed))[arm.structure.spring_indices]
+    assert found.spring_torques == pytest.approx(torque, abs=1e-8)
 
 
 REFUSED = {
