@@ -1,7 +1,7 @@
 """Robots in contact: an arm leans on a wall and carries twice the load, a helix grips a rod, a rod snakes between pegs.
 
-Prints a table for each, and writes into a new folder: the last equilibrium (NPZ), forces along the way and the loaded shape
-(PNG), and an animated page with obstacles and forces (HTML).
+Prints a table for each, and writes into a new folder: the last equilibrium (NPZ, without friction), forces along the way and
+the loaded shape (PNG), and an animated page with obstacles and forces (HTML).
 """
 
 from __future__ import annotations
@@ -141,7 +141,8 @@ def run(arguments: argparse.Namespace) -> Path:
         touch = TOUCHES[name]
         path = touch.follow(np.linspace(0.0, touch.end, steps), friction)
         make_folder(folder)
-        sr.save_result(path.equilibria[-1], folder / f"{name}.npz")
+        if friction == 0.0:  # files of equilibria hold no friction
+            sr.save_result(path.equilibria[-1], folder / f"{name}.npz")
         if not arguments.no_plots:
             for word, figure in _figures(name, path).items():
                 canvas.write_png(figure, folder / f"{name}_{word}.png", overwrite=False)

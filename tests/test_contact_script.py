@@ -36,6 +36,15 @@ def test_an_arm_braces_against_the_wall(tmp_path: Path, capsys: pytest.CaptureFi
 
 
 @pytest.mark.study
+def test_with_friction_the_events_are_told(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
+    folder = tmp_path / "out"
+    words = ["--only", "brace", "--steps", "3", "--friction", "0.3", "--no-plots", "--output", str(folder)]
+    assert run_script("contact", words) == 0
+    assert {path.name for path in folder.iterdir()} == {"brace.html"}
+    assert "changes of contacts: 1 made" in capsys.readouterr().out
+
+
+@pytest.mark.study
 def test_smooth_pegs_push_across_their_axes_and_in_turn_to_either_side() -> None:
     """Nothing else moves the rod than its pull: without pegs it is straight."""
     last = examples.snake(np.linspace(0.0, 0.004, 3)).equilibria[-1]
