@@ -39,7 +39,7 @@ NOT_FOUND = "not found"
 """Outcome: the solver found none, and says so."""
 
 _MARGIN = 1.01  # residual over its tolerance, for the rounding of the second evaluation
-_NORMAL = 1e-5  # of a normal by differences
+_STEP = 1e-6  # [m], of differences of distances; at the border of an edge the normal turns by that over the distance
 _DISTURBED = 20  # every so many cases the energy is compared with that of disturbed springs
 _DISTURBANCES = 40
 _SIZES = (1e-4, 1e-3)  # of a disturbance [rad or m]
@@ -244,8 +244,9 @@ def _broken(
         if one.normal_force < 0.0 or abs(one.gap) > PENETRATION * reach or away > PENETRATION:
             laws.append(f"a contact with force {one.normal_force:.3g} N, gap {one.gap:.3g} m, {away:.3g} off the surface")
         core = one.point + one.normal * min(body.radii[[link == one.link for link in body.links]])
-        if np.abs(slope(obstacle, core) - one.normal).max() > _NORMAL:
-            laws.append(f"a normal that is off by {np.abs(slope(obstacle, core) - one.normal).max():.3g}")
+        off = float(np.abs(slope(obstacle, core, _STEP) - one.normal).max())
+        if off > _STEP / float(distance(obstacle, core)):
+            laws.append(f"a normal that is off by {off:.3g}")
     return laws
 
 

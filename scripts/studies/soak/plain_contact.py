@@ -45,7 +45,7 @@ def _outside(beyond: FloatArray) -> FloatArray:
     return np.asarray(np.linalg.norm(np.maximum(beyond, 0.0), axis=-1) + np.minimum(beyond.max(axis=-1), 0.0))
 
 
-def slope(obstacle: Obstacle, point: FloatArray, step: float = 1e-6) -> FloatArray:
+def slope(obstacle: Obstacle, point: FloatArray, step: float) -> FloatArray:
     """Gradient of the distance at a point, shape (3,), by central differences."""
     steps = step * np.eye(3)
     return np.asarray(distance(obstacle, point + steps) - distance(obstacle, point - steps)) / (2.0 * step)

@@ -29,7 +29,7 @@ BALANCED = 1.0
 _LARGEST_STEP = 0.5  # [rad], norm of one step; the linear model of a revolute chain is inaccurate beyond
 _ARMIJO = 1e-4  # share of the predicted decrease that a step must reach
 _SHORTEST = 1e-10  # share of a step below which it is not halved again
-_DEEP = 1e-2  # penetration that is repaired before energies count, relative to the reach
+_DEEP = 1e-2  # penetration that is repaired before energies count, and that no step leads into, relative to the reach
 _EXACT = 1e-12  # gap of a pressed contact that is zero, relative to the reach
 _LEAST_DAMPING = 0.02  # of the step after one that was cut, relative to the springs
 _ESCAPE = 0.1  # [rad], step out of an unstable equilibrium
@@ -176,7 +176,7 @@ class ContactSearch:
         exact = step.exact and length <= _LARGEST_STEP
 
         def better(trial: Near | None, share: float) -> bool:
-            if trial is None:
+            if trial is None or trial.touch.penetration > max(deep, _DEEP * self._reach):
                 return False
             if below or (exact and share == 1.0 and trial.error <= 0.5 * here.error):
                 return BALANCED < here.error > trial.error
