@@ -16,6 +16,7 @@ import softrobots as sr
 from softrobots.environment.capsules import robot_capsules
 from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, HalfSpace, Sphere
+from studies.soak import contact_cases
 from tests.support.law_robots import PUSHES, directions, model
 from tests.support.oracles import arm_energy
 
@@ -365,3 +366,24 @@ def test_what_contact_cannot_have_is_refused_by_name(arm: sr.SoftModel) -> None:
     block = Environment([Box((0.05, 0.05, 0.05), (0.03, 0.0, 0.07))])
     with pytest.raises(sr.EquilibriumNotFound, match=r"'link_1_root' is 0\.01 m inside of 'box_1', wherever the springs are"):
         sr.solve_equilibrium(arm, (0, 0, 0), environment=block)
+
+
+@pytest.mark.parametrize("force", [(3, 0, -8), (3, 0, -28), (3, 0.01, -28)])
+def test_a_slab_is_a_floor_for_a_robot_that_stands_on_it(force: tuple) -> None:
+    """A slab as thick as two bodies, through which a long step would lead; a half-space has no other side."""
+    rod = sr.load_model(sr.PccArm(muscle_azimuths=(), elastic_sections=8))
+    slab, floor = sr.Environment([Box((2, 2, 0.2), (0, 0, -0.1))]), sr.Environment([HalfSpace((0, 0, 1))])
+    on_slab, on_floor = (sr.solve_equilibrium(rod, (), force, environment=ground) for ground in (slab, floor))
+    assert on_slab.stable
+    assert on_slab.tip_position == pytest.approx(on_floor.tip_position, abs=1e-8)  # both to 1e-10 of the load
+
+
+def test_a_start_inside_of_an_obstacle_without_a_near_way_out_is_bent_aside() -> None:
+    """The relaxed robot runs through the middle of three obstacles; the energy is that of the equilibrium with them."""
+    random = contact_cases.family_of("arm")
+    body = contact_cases.PlainBody(contact_cases.PlainStatics(random.robot()))
+    case, obstacles = contact_cases.draw(random, body, 101, 122)
+    assert body.nearest(obstacles, body.cores(case.motors, np.zeros((1, 4)))[0]).gap.min() < -0.1
+    tally = contact_cases.judge(random, 101, range(122, 123))
+    assert tally.broken == []
+    assert sum(count for outcome, count in tally.outcomes.items() if outcome.isdecimal()) == 1
