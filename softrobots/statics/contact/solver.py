@@ -1,6 +1,9 @@
-"""Equilibrium in contact without friction, from a start or under a load that grows from zero."""
+"""Equilibrium in contact without friction: from a start, under a load that grows from zero, or from a robot bent aside."""
 
 from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
 
 import numpy as np
 
@@ -8,20 +11,25 @@ from softrobots.core.checks import FloatArray
 from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.contact.descent import BALANCED, ContactSearch, Near
 from softrobots.statics.contact.touch import TOUCHING, ForceTable, resting_forces
-from softrobots.statics.elastic_state import ElasticProblem, ElasticState, norm
+from softrobots.statics.elastic_state import ElasticProblem, ElasticState
+from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.stability import is_stable
 
-_WAYS, _ASIDE = 2, 0.7  # motions that change gaps most, by which a stuck search starts again; and how far [rad]
 _FIRST_GROWTH, _LEAST_GROWTH = 0.25, 1e-3  # parts of the load that are added at once
+_ASIDE = (0.1, 0.2, 0.4, 0.8)  # motions of the tip, relative to the reach, of robots that are bent aside
+_MOST_ASIDE = 4  # of them that are tried
 
 
 def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[ElasticState, int, bool]:
-    """Find an equilibrium in contact, from a start or, if that fails, from springs bent aside or under a load that grows.
+    """Find an equilibrium in contact, from a start, or if that fails under a load that grows from zero, or from aside.
+
+    From aside: a start that is inside of obstacles may be repaired into a place without a way out. Then the robot starts bent
+    as by a force on its tip, as little as frees it, in one direction after another.
 
     Args:
         problem: The robot under a load that has a potential, with an environment.
         start: Elastic coordinates, shape (n_springs,) [rad or m].
-        most: Limit of evaluations.
+        most: Limit of evaluations, of each start aside once more.
 
     Returns:
         The last state, whether or not it is an equilibrium; the evaluations spent; and whether it is a stable equilibrium.
@@ -32,11 +40,15 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
         return problem.state(start), 1, False
     first = search.repaired(first)
     found, stable = search.descend(first)
-    if found.error > BALANCED and found.touch.penetration > TOUCHING * problem.model.reach and not search.blocked(found):
-        found, stable = _from_aside(search, start, found)
     if found.error > BALANCED and not search.blocked(found):
         grown, stable = _grown(search, first)
         found = grown if grown is not None and grown.error < found.error else found
+        for begin in _aside(search, start) if found.error > BALANCED else ():
+            search.most = search.spent + most
+            aside, stable = search.descend(begin)
+            if aside.error <= BALANCED:
+                found = aside
+                break
     if found.error > BALANCED:
         return found.state, search.spent, False
     least = _of_least_norm(search, found)
@@ -45,20 +57,21 @@ def settle(problem: ElasticProblem, start: FloatArray, most: int) -> tuple[Elast
     return found.state, search.spent, stable
 
 
-def _from_aside(search: ContactSearch, start: FloatArray, stuck: Near) -> tuple[Near, bool]:
-    """Descend from springs bent aside, where the way out of an obstacle ended inside; the best, and whether it is stable."""
-    _, _, right = np.linalg.svd(stuck.touch.rows / np.sqrt(search.problem.model.stiffness))
-    for direction in right[:_WAYS] / np.sqrt(search.problem.model.stiffness):
-        for sign in (1.0, -1.0):
-            if search.spent >= search.most:
-                return stuck, False
-            begin = search.near(start + sign * _ASIDE / norm(direction) * direction)
-            if begin is None:
-                continue
-            found, stable = search.descend(search.repaired(begin))
-            if found.error <= BALANCED:
-                return found, stable
-    return stuck, False
+def _aside(search: ContactSearch, start: FloatArray) -> Iterator[Near]:
+    """Free robots that are bent from a start as by a force on the tip, the least bent first."""
+    model = search.problem.model
+    point = model.coordinates.at(search.problem.q_motors, start)
+    jacobian = point.columns(frame_jacobian(model, model.embed(point.joints), model.tip)[:3])[1]
+    found = 0
+    for size, direction in itertools.product(_ASIDE, itertools.product((-1.0, 0.0, 1.0), repeat=3)):
+        bent = (jacobian.T @ direction) / model.stiffness
+        length = float(np.linalg.norm(jacobian @ bent))
+        near = search.near(start + bent * (size * model.reach / length)) if length > 0.0 else None
+        if near is not None and near.touch.penetration == 0.0:
+            yield near
+            found += 1
+            if found == _MOST_ASIDE:
+                return
 
 
 def _of_least_norm(search: ContactSearch, found: Near) -> Near | None:
