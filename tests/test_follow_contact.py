@@ -228,7 +228,9 @@ def test_a_path_is_saved_and_loaded_with_its_friction(tmp_path: Path) -> None:
     path = sr.follow_contact(block(), [[0.0], [0.1], [0.05]], (0, 0, -10.0), environment=FLOOR, friction=0.3)
     for suffix in ("npz", "json"):
         read = sr.load_result(sr.save_result(path, tmp_path / f"path.{suffix}"))
-        assert read.summary == path.summary
+        assert read.summary() == path.summary()
+        assert len(repr(read)) < 120
+        assert repr(read.contacts[0][0]) == repr(path.contacts[0][0])
         assert read.forces == pytest.approx(path.forces, abs=1e-12)
         assert [[one.status for one in row] for row in read.contacts] == [["sticks"], ["slips"], ["sticks"]]
     lines = sr.save_csv(path, tmp_path / "path.csv").read_text(encoding="utf-8").splitlines()

@@ -180,3 +180,20 @@ def test_a_mesh_file_is_read_and_must_be_convex(suffix: str, tmp_path: Path) -> 
     (tmp_path / f"bad.{suffix}").write_bytes(b"\x00" * 50)
     with pytest.raises(sr.FileFormatError):
         sr.Mesh(tmp_path / f"bad.{suffix}")
+
+
+@pytest.mark.parametrize("kind", [kind for kind in OBSTACLES if kind != "mesh"])
+@given(data=st.data())
+@settings(max_examples=5)
+def test_an_obstacle_is_shown_as_the_call_that_makes_it(kind: str, data: st.DataObject) -> None:
+    obstacle = data.draw(OBSTACLES[kind])
+    assert eval(repr(obstacle), dict(vars(sr))) == obstacle
+    assert "pose" not in repr(obstacle)
+
+
+def test_many_obstacles_are_shown_in_one_line() -> None:
+    room = sr.Environment([sr.Sphere(0.1, name="ball"), sr.Box((1, 1, 1), pose=swing), *(sr.Sphere(1.0) for _ in range(8))])
+    assert repr(room).startswith("Environment(ball: Sphere, box_1: Box, sphere_1: Sphere, ")
+    assert repr(room).endswith(", 4 more)")
+    assert repr(sr.Environment(self_contact=True)) == "Environment(self_contact)"
+    assert repr(sr.Mesh(np.random.default_rng(1).normal(size=(40, 3)), hull=True)).endswith(" rows>)")

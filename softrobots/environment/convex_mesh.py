@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 import warnings
-from dataclasses import InitVar, dataclass, field
+from dataclasses import InitVar, dataclass
 from functools import lru_cache
 from typing import Any, ClassVar, NamedTuple
 
@@ -41,7 +41,7 @@ class Hull(NamedTuple):
     """Triangles at the edge, shape (e, 2), integers."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Mesh(Obstacle):
     """A convex body, given by a file of triangles or by its corners."""
 
@@ -50,7 +50,7 @@ class Mesh(Obstacle):
     as points; only the corners of the convex body are kept."""
     position: Any = (0.0, 0.0, 0.0)
     """Where its own origin is, world axes, shape (3,) [m]."""
-    rotation: Any = field(default=NO_TURN, repr=False)
+    rotation: Any = NO_TURN
     """Its own axes as columns, shape (3, 3)."""
     scale: InitVar[Any] = 1.0
     """What the numbers of file or points are multiplied by: 0.001 for millimetres; one number, or shape (3,)."""

@@ -19,8 +19,10 @@ from softrobots.environment.world_files import PLAIN_DATA, read_obstacles, read_
 KINDS: dict[str, type[Obstacle]] = {kind.kind: kind for kind in (HalfSpace, Sphere, Box, Cylinder, Capsule, Mesh)}
 """Obstacles by their kind in plain data."""
 
+_SHOWN = 6  # obstacles in a line
 
-@dataclass(frozen=True, eq=False)
+
+@dataclass(frozen=True, eq=False, repr=False)
 class Environment:
     """The obstacles that a robot may touch, and whether it may touch itself.
 
@@ -54,6 +56,13 @@ class Environment:
         doubled = [name for name in self.names if self.names.count(name) > 1]
         if doubled:
             raise ParameterError("obstacles", self.names, f"of different names ({doubled[0]!r} comes more than once)")
+
+    def __repr__(self) -> str:
+        """Names and kinds of the first obstacles, and how many more there are, in one line."""
+        words = [f"{one.name}: {type(one).__name__}" for one in self.obstacles[:_SHOWN]]
+        if len(self) > _SHOWN:
+            words.append(f"{len(self) - _SHOWN} more")
+        return f"Environment({', '.join([*words, 'self_contact'] if self.self_contact else words)})"
 
     @property
     def names(self) -> tuple[str, ...]:

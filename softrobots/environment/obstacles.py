@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import MISSING, dataclass, fields, replace
 from typing import Any, ClassVar, TypeVar
 
 import numpy as np
@@ -26,6 +26,7 @@ Kind = TypeVar("Kind", bound="Obstacle")
 
 NO_TURN = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 _ROTATION_ERROR = 1e-9
+_ROWS_SHOWN = 4  # of an array, in a line
 
 
 def rotation_matrix(name: str, value: Any) -> FloatArray:
@@ -52,7 +53,7 @@ def _transform(rotation: FloatArray, position: FloatArray) -> FloatArray:
     return matrix
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Obstacle:
     """A rigid obstacle; equal, with the same hash, if everything that describes it is equal, and `pose` is the same function.
 
@@ -141,6 +142,18 @@ class Obstacle:
             (value.shape, (value + 0.0).tobytes()) if isinstance(value, np.ndarray) else value for value in values
         )
 
+    def __repr__(self) -> str:
+        """What differs from the defaults, in one line; of a mesh the number of its vertices."""
+        words = []
+        for one in fields(self):
+            value = getattr(self, one.name)
+            if not one.init or (one.default is not MISSING and np.array_equal(value, one.default)):
+                continue
+            if isinstance(value, np.ndarray):
+                value = f"<{len(value)} rows>" if len(value) > _ROWS_SHOWN else value.tolist()
+            words.append(f"{one.name}={value if isinstance(value, str) and one.name != 'name' else repr(value)}")
+        return f"{type(self).__name__}({', '.join(words)})"
+
     def __eq__(self, other: object) -> bool:
         """Whether the other is the same obstacle."""
         return isinstance(other, Obstacle) and self._content() == other._content()
@@ -150,7 +163,7 @@ class Obstacle:
         return hash(self._content())
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class HalfSpace(Obstacle):
     """A wall or floor: the robot is free where `normal . x >= offset`."""
 
@@ -173,7 +186,7 @@ class HalfSpace(Obstacle):
         return _transform(axes_along(self.normal), self.offset * self.normal)
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Sphere(Obstacle):
     """A ball."""
 
@@ -190,7 +203,7 @@ class Sphere(Obstacle):
         super().__post_init__()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Box(Obstacle):
     """A rectangular block."""
 
@@ -198,7 +211,7 @@ class Box(Obstacle):
     """Length of its edges along its own x, y and z, shape (3,) [m]."""
     position: Any = (0.0, 0.0, 0.0)
     """Centre, world axes, shape (3,) [m]."""
-    rotation: Any = field(default=NO_TURN, repr=False)
+    rotation: Any = NO_TURN
     """Its own axes as columns, shape (3, 3)."""
 
     kind: ClassVar[str] = "box"
@@ -210,7 +223,7 @@ class Box(Obstacle):
         super().__post_init__()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class _Round(Obstacle):
     """A body of revolution about its own z axis."""
 
@@ -220,7 +233,7 @@ class _Round(Obstacle):
     """Length along its own z axis [m]; of a capsule: of the straight part, between the centres of the round ends."""
     position: Any = (0.0, 0.0, 0.0)
     """Centre, world axes, shape (3,) [m]."""
-    rotation: Any = field(default=NO_TURN, repr=False)
+    rotation: Any = NO_TURN
     """Its own axes as columns, shape (3, 3)."""
 
     def __post_init__(self) -> None:
@@ -230,14 +243,14 @@ class _Round(Obstacle):
         super().__post_init__()
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Cylinder(_Round):
     """A cylinder with flat ends, along its own z axis."""
 
     kind: ClassVar[str] = "cylinder"
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Capsule(_Round):
     """A cylinder with round ends, along its own z axis; `length` is that of the straight part."""
 

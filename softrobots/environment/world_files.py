@@ -24,6 +24,7 @@ PLAIN_DATA = (".yaml", ".yml", ".json")
 """What names of files of plain data end with."""
 LARGEST_FILE = 10_000_000
 """Largest size of a file of plain data [bytes]."""
+_NAMED = 4  # joints in an error
 MOST_OBSTACLES = 1000
 """Most obstacles of a file."""
 
@@ -75,8 +76,10 @@ def _beside(data: Any, folder: Path) -> Any:
 def _obstacles(tree: RigidTree, source: str, hull: bool) -> list[Obstacle]:
     moving = [joint.name for joint in tree.joints if joint.movable]
     if moving:
+        more = f" and {len(moving) - _NAMED} more" if len(moving) > _NAMED else ""
         raise DescriptionError(
-            f"{source} has joints that move: {', '.join(moving)}; obstacles are fixed to the world: fixed joints only"
+            f"{source} has joints that move: {', '.join(moving[:_NAMED])}{more}; "
+            "obstacles are fixed to the world: fixed joints only"
         )
     places = {tree.root: Placement()}
     for joint in tree.joints:  # parents first

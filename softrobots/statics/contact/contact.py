@@ -53,6 +53,11 @@ class Contact:
     with_itself: bool = False
     """Whether `obstacle` is a link of the robot itself."""
 
+    def __repr__(self) -> str:
+        """Bodies, status, force and place in one line."""
+        place = ", ".join(f"{number + 0.0:.4g}" for number in self.point.round(6))
+        return f"Contact({self.link} on {self.obstacle}: {self.status}, {self.normal_force:.6g} N at ({place}) m)"
+
     def __post_init__(self) -> None:
         """Make the arrays read-only."""
         for array in (self.point, self.obstacle_point, self.normal, self.force, self.slip):

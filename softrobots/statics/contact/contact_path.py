@@ -53,6 +53,10 @@ class ContactJump:
         """Distance between the positions of the tip before and after [m]."""
         return float(np.linalg.norm(self.after.tip_position - self.before.tip_position))
 
+    def __repr__(self) -> str:
+        """The jump in one line, instead of its equilibria."""
+        return f"ContactJump({self})"
+
     def __str__(self) -> str:
         """Describe the jump in one line."""
         return f"{self.parameter:.6g}: jump of the tip by {self.distance:.4g} m, {self.energy_lost:.4g} J lost"
@@ -98,9 +102,15 @@ class ContactPath:
         rows = [np.sum([contact.force for contact in row] or np.zeros((1, 3)), axis=0) for row in self.contacts]
         return read_only(np.array(rows))
 
-    @property
+    def __repr__(self) -> str:
+        """Robot, parameters, friction and what happens in one line, instead of all equilibria."""
+        span = f"parameter {self.parameters[0]:.6g} to {self.parameters[-1]:.6g}"
+        happens = f"{len(self.events)} events, {len(self.jumps)} jumps"
+        steps = f"{len(self.equilibria)} equilibria, {span}, friction {self.friction:g}"
+        return f"ContactPath({self.model.pinocchio.name}, {steps}, {happens})"
+
     def summary(self) -> str:
-        """A text of a few lines: steps, events, jumps, work of friction."""
+        """Return steps, events, jumps and work of friction, one a line."""
         span = f"parameter {self.parameters[0]:.6g} to {self.parameters[-1]:.6g}"
         lines = [f"{len(self.equilibria)} equilibria, {span}, friction coefficient {self.friction:g}"]
         lines += [str(event) for event in self.events] + [str(jump) for jump in self.jumps]
