@@ -150,7 +150,7 @@ def test_a_folded_robot_is_as_far_from_itself_as_by_minimisation(arm: sr.SoftMod
     """Four links: SciPy's minimum over both cores, to its tolerance; derivatives by differences."""
     robot = sr.load_model(sr.InflatableArm(link_lengths=(0.4,) * 4, stiffness=100.0))
     surroundings, random, features = Surroundings(robot, sr.Environment([], self_contact=True)), np.random.default_rng(0), set()
-    crossing = 0
+    links, crossing = [one.link for one in robot_capsules(robot) if one.joint > 0], 0
     for _ in range(8):
         q = random.uniform(-1.3, 1.3, robot.pinocchio.nv)
         gaps, cores = surroundings.at(q, 1.0), cores_at(robot, q)
@@ -160,7 +160,7 @@ def test_a_folded_robot_is_as_far_from_itself_as_by_minimisation(arm: sr.SoftMod
             found = minimize(square, [0.5, 0.5], bounds=[(0.0, 1.0)] * 2, options={"ftol": 1e-16, "gtol": 1e-13})
             assert gaps.values[row] == pytest.approx(np.sqrt(found.fun) - one - two, abs=1e-9)
             crossing += int(0.01 < found.x[0] < 0.99 and 0.01 < found.x[1] < 0.99)
-            assert surroundings.names[gaps.obstacles[row]] == surroundings.links[gaps.obstacles[row]]
+            assert surroundings.pair(gaps, row) == (links[gaps.capsules[row]], links[gaps.obstacles[row]], True)
         features |= compare_derivatives(surroundings, q, 1.0)
     assert {1, 2} <= features
     assert crossing > 0

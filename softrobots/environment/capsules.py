@@ -19,8 +19,6 @@ class RobotCapsule:
 
     link: str
     """Name of the link that carries it."""
-    frame: int
-    """Number of that link among the frames of Pinocchio's model."""
     joint: int
     """Number of the joint that moves it in Pinocchio's model; 0, the world, for one that never moves."""
     start: FloatArray
@@ -44,12 +42,11 @@ def robot_capsules(model: SoftModel) -> tuple[RobotCapsule, ...]:
         ParameterError: If `model` is not a `SoftModel`.
         DescriptionError: If the description has neither capsules nor collision shapes that are spheres or cylinders.
     """
-    frames, capsules = check_model(model).pinocchio.frames, []
+    capsules = []
     for tag in capsule_tags(model):
-        number = model.frame_id(tag.link)
-        frame = frames[number]
+        frame = model.pinocchio.frames[model.frame_id(tag.link)]
         start, end = (read_only(np.asarray(frame.placement.act(np.array(point)))) for point in (tag.start, tag.end))
-        capsules.append(RobotCapsule(tag.link, number, frame.parentJoint, start, end, tag.radius))
+        capsules.append(RobotCapsule(tag.link, frame.parentJoint, start, end, tag.radius))
     return tuple(capsules)
 
 

@@ -262,11 +262,13 @@ class Surroundings:
         self._pairs = self_contact_pairs(model, self._cores) if environment.self_contact else None
         self._fields, self._transforms = obstacle_fields(environment), obstacle_transforms(environment)
         self._reach = model.reach
-        links = tuple(one.link for one in self._cores.capsules)
-        self.links = links
-        """Link of each capsule of the robot."""
-        self.names = (*environment.names, *links)
-        """Name of each obstacle, and then the link of each capsule, which the robot itself may touch."""
+        self._links = tuple(one.link for one in self._cores.capsules)
+        self._names = (*environment.names, *self._links)  # of obstacles, and of capsules, which the robot itself may touch
+
+    def pair(self, gaps: Gaps, place: int) -> tuple[str, str, bool]:
+        """Link of a candidate; its obstacle, or other link; and whether that is a link."""
+        other = int(gaps.obstacles[place])
+        return self._links[gaps.capsules[place]], self._names[other], other >= len(self._transforms)
 
     def at(self, q: FloatArray, margin: float) -> Gaps:
         """Return the candidates of contact.

@@ -10,7 +10,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.environment.convex_mesh import Mesh, hull_of
 from softrobots.environment.distance_fields import Cylinders, Field, HalfSpaces, RoundedBoxes
 from softrobots.environment.environment import Environment
-from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
+from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
 
 
 def obstacle_fields(environment: Environment) -> list[tuple[Field, Any]]:
@@ -21,16 +21,11 @@ def obstacle_fields(environment: Environment) -> list[tuple[Field, Any]]:
     """
     transforms = obstacle_transforms(environment)
     fields: list[tuple[Field, Any]] = []
-    for kinds, make in ((HalfSpace, _half_spaces), ((Box, Sphere, Capsule), _rounded_boxes), (Cylinder, _cylinders)):
+    boxes = (Box, Sphere, Capsule), _rounded_boxes
+    for kinds, make in ((HalfSpace, _half_spaces), boxes, (Cylinder, _cylinders), (Mesh, _polyhedra)):
         numbers = np.array([i for i, one in enumerate(environment.obstacles) if isinstance(one, kinds)], dtype=np.intp)
         if len(numbers):
             fields.append((make([environment.obstacles[i] for i in numbers.tolist()], transforms[numbers]), numbers))
-    numbers = np.array([i for i, one in enumerate(environment.obstacles) if isinstance(one, Mesh)], dtype=np.intp)
-    if len(numbers):
-        from softrobots.environment.polyhedra import Polyhedra  # SciPy
-
-        hulls = [hull_of(environment.obstacles[i].vertices.tobytes()) for i in numbers.tolist()]
-        fields.append((Polyhedra(transforms[numbers, :3, :3], transforms[numbers, :3, 3], hulls), numbers))
     return fields
 
 
@@ -45,17 +40,18 @@ def _half_spaces(obstacles: list[Any], transforms: FloatArray) -> HalfSpaces:
 
 
 def _rounded_boxes(obstacles: list[Any], transforms: FloatArray) -> RoundedBoxes:
-    halves = [_half(one) for one in obstacles]
+    sizes = [one.size if isinstance(one, Box) else (0.0, 0.0, getattr(one, "length", 0.0)) for one in obstacles]
     radii = np.array([getattr(one, "radius", 0.0) for one in obstacles])
-    return RoundedBoxes(transforms[:, :3, :3], transforms[:, :3, 3], np.array(halves), radii)
-
-
-def _half(obstacle: Obstacle) -> FloatArray:
-    if isinstance(obstacle, Box):
-        return np.asarray(0.5 * obstacle.size)
-    return np.array([0.0, 0.0, 0.5 * obstacle.length if isinstance(obstacle, Capsule) else 0.0])
+    return RoundedBoxes(transforms[:, :3, :3], transforms[:, :3, 3], 0.5 * np.array(sizes), radii)
 
 
 def _cylinders(obstacles: list[Any], transforms: FloatArray) -> Cylinders:
     halves = np.array([0.5 * one.length for one in obstacles])
     return Cylinders(transforms[:, :3, :3], transforms[:, :3, 3], halves, np.array([one.radius for one in obstacles]))
+
+
+def _polyhedra(obstacles: list[Any], transforms: FloatArray) -> Field:
+    from softrobots.environment.polyhedra import Polyhedra  # SciPy
+
+    hulls = [hull_of(one.vertices.tobytes()) for one in obstacles]
+    return Polyhedra(transforms[:, :3, :3], transforms[:, :3, 3], hulls)

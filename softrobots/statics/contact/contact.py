@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.environment.gaps import Gaps, Surroundings
 from softrobots.statics.contact.certificate import ActiveContacts
 from softrobots.statics.contact.touch import Touch
 
@@ -66,25 +67,31 @@ class Contact:
 
 def contacts_of(touch: Touch, active: ActiveContacts) -> tuple[Contact, ...]:
     """Return the touching candidates of a state as contacts without friction."""
-    gaps, pressed = touch.gaps, set(active.pressed.tolist())
-    points, opposite = gaps.points, gaps.obstacle_points
-    pairs = {place: touch.pair(place) for place in active.touching.tolist()}
+    pressed, nothing = set(active.pressed.tolist()), np.zeros(3)
     return tuple(
-        Contact(
-            link=link,
-            obstacle=obstacle,
-            point=points[place].copy(),
-            obstacle_point=opposite[place].copy(),
-            normal=gaps.normals[place].copy(),
-            normal_force=float(touch.forces[place]),
-            force=touch.forces[place] * gaps.normals[place],
-            gap=float(gaps.values[place]),
-            strict=place in pressed,
-            status=PRESSED if place in pressed else TOUCHING,
-            slip=np.zeros(3),
-            with_itself=with_itself,
-        )
-        for place, (link, obstacle, with_itself) in pairs.items()
+        contact_at(touch.surroundings, touch.gaps, place, force, nothing, PRESSED if place in pressed else TOUCHING, nothing)
+        for place, force in zip(active.touching.tolist(), touch.forces[active.touching].tolist(), strict=True)
+    )
+
+
+def contact_at(
+    surroundings: Surroundings, gaps: Gaps, place: int, normal_force: float, friction: FloatArray, status: str, slip: FloatArray
+) -> Contact:
+    """Return the contact of a candidate, with its normal force [N], friction, shape (3,) [N], status and slip."""
+    link, obstacle, with_itself = surroundings.pair(gaps, place)
+    return Contact(
+        link=link,
+        obstacle=obstacle,
+        point=gaps.points[place].copy(),
+        obstacle_point=gaps.obstacle_points[place].copy(),
+        normal=gaps.normals[place].copy(),
+        normal_force=normal_force,
+        force=normal_force * gaps.normals[place] + friction,
+        gap=float(gaps.values[place]),
+        strict=status != TOUCHING,
+        status=status,
+        slip=slip.copy(),
+        with_itself=with_itself,
     )
 
 

@@ -53,13 +53,6 @@ def forces_of(gaps: Gaps, contacts: tuple[Contact, ...]) -> dict[Any, tuple[floa
     return {gaps.keys[row]: part for row, part in zip(nearest, parts, strict=True)}
 
 
-def tangent_planes(normals: FloatArray) -> FloatArray:
-    """Return two orthogonal unit vectors across each normal, shape (m, 2, 3)."""
-    first = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
-    first /= np.linalg.norm(first, axis=1)[:, None]
-    return np.stack([first, np.cross(normals, first)], axis=1)
-
-
 def world(tangents: FloatArray, parts: FloatArray) -> FloatArray:
     """Return vectors of tangent planes, shape (m, 2), in world axes, shape (m, 3)."""
     return np.asarray(np.einsum("mki,mk->mi", tangents, parts))

@@ -13,15 +13,16 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.vectors import axes_along
 from softrobots.environment.gaps import Gaps
 from softrobots.environment.turning import turning
 from softrobots.model.coordinates import Point
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import null_space
-from softrobots.statics.contact.contact import PRESSED, SLIPS, STICKS, TOUCHING, Contact
+from softrobots.statics.contact.contact import PRESSED, SLIPS, STICKS, TOUCHING, Contact, contact_at
 from softrobots.statics.contact.coulomb import Balance, NearContacts
-from softrobots.statics.contact.last_state import MARGIN, Given, Sliding, forces_by_key, tangent_planes, world
+from softrobots.statics.contact.last_state import MARGIN, Given, Sliding, forces_by_key, world
 from softrobots.statics.contact.touch import joined
 from softrobots.statics.elastic_state import TOLERANCE, largest_residual
 from softrobots.statics.equilibrium_result import Equilibrium
@@ -37,7 +38,7 @@ class _Place:
 
     def __init__(self, point: Point, q: FloatArray, gaps: Gaps, applied: JointLoad) -> None:
         self.point, self.q, self.gaps, self.applied = point, q, gaps, applied
-        self.tangents = tangent_planes(gaps.normals)
+        self.tangents = axes_along(gaps.normals)[:, :, :2].swapaxes(1, 2)
         """Two unit vectors of each tangent plane, shape (m, 2, 3)."""
 
 
@@ -206,27 +207,14 @@ class SlidingRobot:
         gaps, pressed = self.at.gaps, self.pressed(found)
         slid = world(self.at.tangents, found.contacts.sliding)
         along = world(self.at.tangents, found.friction)
-        surroundings = self.given.surroundings
+        if self.last.friction == 0.0:
+            slid = np.zeros_like(slid)
         contacts = []
-        for row in np.flatnonzero(pressed | (np.abs(gaps.values) <= _TOUCHES * self.reach)):
-            force, moved = found.normal[row] * gaps.normals[row] + along[row], slid[row]
-            slips = np.linalg.norm(moved) > _SLIPS * self.reach
+        for row in np.flatnonzero(pressed | (np.abs(gaps.values) <= _TOUCHES * self.reach)).tolist():
+            slips = np.linalg.norm(slid[row]) > _SLIPS * self.reach
             status = TOUCHING if not pressed[row] else PRESSED if self.last.friction == 0.0 else SLIPS if slips else STICKS
-            contacts.append(
-                Contact(
-                    link=surroundings.links[gaps.capsules[row]],
-                    obstacle=surroundings.names[gaps.obstacles[row]],
-                    point=gaps.points[row].copy(),
-                    obstacle_point=gaps.obstacle_points[row].copy(),
-                    normal=gaps.normals[row].copy(),
-                    normal_force=float(found.normal[row]),
-                    force=force,
-                    gap=float(gaps.values[row]),
-                    strict=bool(pressed[row]),
-                    status=status,
-                    slip=moved if self.last.friction > 0.0 else np.zeros(3),
-                )
-            )
+            force = float(found.normal[row])
+            contacts.append(contact_at(self.given.surroundings, gaps, row, force, along[row], status, slid[row]))
         return tuple(contacts)
 
     def equilibrium(self, found: Balance, iterations: int) -> Equilibrium:

@@ -51,11 +51,6 @@ class Touch(NamedTuple):
         """Depth of the deepest penetration, zero without one [m]."""
         return max(0.0, -float(self.gaps.values.min(initial=0.0)))
 
-    def pair(self, place: int) -> tuple[str, str, bool]:
-        """Link of a candidate; its obstacle, or other link; and whether that is a link."""
-        links, names, other = self.surroundings.links, self.surroundings.names, int(self.gaps.obstacles[place])
-        return links[self.gaps.capsules[place]], names[other], other >= len(names) - len(links)
-
     @property
     def pushes(self) -> FloatArray:
         """Load of the forces on the elastic coordinates, shape (n_springs,)."""
@@ -179,6 +174,6 @@ def deepest_penetration(touch: Touch) -> str:
     depths = np.maximum(-touch.gaps.values, 0.0)
     fixed = depths * ~touch.rows.any(axis=1)
     place = int((fixed if fixed.any() else depths).argmax())
-    link, other, _ = touch.pair(place)
+    link, other, _ = touch.surroundings.pair(touch.gaps, place)
     advice = ", wherever the springs are: move the motors or the obstacle" if fixed.any() else ""
     return f"{link!r} is {depths[place]:.3g} m inside of {other!r}{advice}"

@@ -16,7 +16,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, one_each, positive_integer, read_only, unit_vector
 from softrobots.core.errors import LoadNotFound, NeutralEquilibrium, ParameterError
-from softrobots.environment.capsules import robot_capsules
+from softrobots.environment.capsules import capsule_tags
 from softrobots.model.loader import with_points
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.kinematics import frame_placement
@@ -143,22 +143,21 @@ def _fitted(
 
 def _on_body(model: SoftModel, count: int) -> list[_Candidate]:
     """The middles of equal pieces of each capsule that moves, and the ends of cores at which no other core ends."""
-    rows, capsules, q = list[_Candidate](), robot_capsules(model), model.configuration(model.relaxed_motors)
-    poses = [frame_placement(model, q, one.link) * model.pinocchio.frames[one.frame].placement.inverse() for one in capsules]
-    ends = np.array([pose.act(end) for pose, one in zip(poses, capsules, strict=True) for end in (one.start, one.end)])
-    for number, one in enumerate(capsules):
-        placement, along = model.pinocchio.frames[one.frame].placement, one.end - one.start
-        length = float(np.linalg.norm(along))
-        if one.joint == 0 or length == 0.0:
+    rows, capsules, q = list[_Candidate](), capsule_tags(model), model.configuration(model.relaxed_motors)
+    cores = [np.array([one.start, one.end]) for one in capsules]
+    poses = [frame_placement(model, q, one.link) for one in capsules]
+    ends = np.array([pose.act(end) for pose, core in zip(poses, cores, strict=True) for end in core])
+    for number, (one, (start, end)) in enumerate(zip(capsules, cores, strict=True)):
+        length = float(np.linalg.norm(end - start))
+        if model.pinocchio.frames[model.frame_id(one.link)].parentJoint == 0 or length == 0.0:
             continue
-        axis = placement.rotation.T @ along / length
+        axis = (end - start) / length
         for share in (np.arange(count) + 0.5) / count:
-            point = placement.actInv(one.start + share * along)
-            rows.append(_Candidate(one.link, point, axis, None, length / count))
-        for place, (end, outward) in enumerate(((one.start, -axis), (one.end, axis))):
+            rows.append(_Candidate(one.link, start + share * (end - start), axis, None, length / count))
+        for place, (point, outward) in enumerate(((start, -axis), (end, axis))):
             others = np.delete(ends, 2 * number + place, axis=0)
             if np.linalg.norm(others - ends[2 * number + place], axis=1).min() > _APART * model.reach:
-                rows.append(_Candidate(one.link, placement.actInv(end), None, outward, 0.5 * np.pi * one.radius))
+                rows.append(_Candidate(one.link, point, None, outward, 0.5 * np.pi * one.radius))
     return rows
 
 
