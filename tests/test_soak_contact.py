@@ -45,7 +45,7 @@ def tampered(monkeypatch: pytest.MonkeyPatch, change: Callable[[Any], Any]) -> l
     """Laws that are broken when the answers for the arm are changed."""
     solve = contact_cases.solve_equilibrium
     monkeypatch.setattr(contact_cases, "solve_equilibrium", lambda *asked, **load: change(solve(*asked, **load)))
-    return [law for _, law in judge(family_of("arm"), 5, range(8)).broken]
+    return [law for _, law in judge(family_of("arm"), 5, range(2, 5)).broken]
 
 
 def with_contacts(found: Any, **changes: Any) -> Any:
