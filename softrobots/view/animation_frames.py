@@ -101,11 +101,8 @@ def even_frames(path: Path, seconds: float) -> list[Frame]:
         before, after = after - 1, min(after, len(rows) - 1)
         interval = float(rows[after] - rows[before])
         share = float(moment - rows[before]) / interval if interval > 0.0 else 0.0
-        ends = states[before], states[after]
-        motors, springs = (
-            (1.0 - share) * begin + share * end
-            for begin, end in ((ends[0].q_motors, ends[1].q_motors), (ends[0].q_springs, ends[1].q_springs))
-        )
+        motors = (1.0 - share) * states[before].q_motors + share * states[after].q_motors
+        springs = (1.0 - share) * states[before].q_springs + share * states[after].q_springs
         frames.append(Frame(number, motors, springs, states[after if share > 0.5 else before]))
     return frames
 

@@ -7,6 +7,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from softrobots.statics.contact.contact import Contact
 from softrobots.view.appearance import (
     CAPSULE_COLOUR,
     CONTACT_COLOUR,
@@ -21,7 +22,6 @@ from softrobots.view.appearance import (
 )
 from softrobots.view.robot_shapes import Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Scene
-from softrobots.view.surroundings import DrawnContact
 from softrobots.view.tension_scale import ZERO_COLOUR, DrawnActuator, scale_end, tension_colour
 
 _MOST_NAMED = 12  # actuators that are listed one by one
@@ -78,7 +78,7 @@ def legend(
     return entries
 
 
-def contact_entries(states: Sequence[Mapping[str, DrawnContact]]) -> list[LegendEntry]:
+def contact_entries(states: Sequence[Mapping[str, Contact]]) -> list[LegendEntry]:
     """Return the contacts of some states of a robot: the sum of the forces of each obstacle, of many obstacles their range.
 
     Args:
@@ -92,7 +92,7 @@ def contact_entries(states: Sequence[Mapping[str, DrawnContact]]) -> list[Legend
     return [LegendEntry(CONTACT_COLOUR, _words_of_contact(name, some, name in slipping)) for name, some in forces.items()]
 
 
-def _pressing(obstacle: str, contacts: Mapping[str, DrawnContact]) -> tuple[float, int]:
+def _pressing(obstacle: str, contacts: Mapping[str, Contact]) -> tuple[float, int]:
     """Sum of the sizes of the forces of an obstacle on a robot [N], and the number of points."""
     sizes = [float(np.linalg.norm(one.force)) for one in contacts.values() if one.obstacle == obstacle]
     return sum(sizes), len(sizes)

@@ -17,6 +17,7 @@ from softrobots.environment.environment import Environment
 from softrobots.model.link_limits import link_limits
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import HelixTube
+from softrobots.statics.contact.contact import Contact
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone, frame_placement
 from softrobots.statics.loads import Load
@@ -32,7 +33,7 @@ from softrobots.view.animation_frames import (
 )
 from softrobots.view.body import BentSections, SegmentBody
 from softrobots.view.robot_shapes import RobotShapes
-from softrobots.view.surroundings import DrawnContact, DrawnObstacle, drawn_capsules, drawn_contacts, drawn_obstacles
+from softrobots.view.surroundings import DrawnObstacle, drawn_capsules, drawn_contacts, drawn_obstacles
 from softrobots.view.tension_scale import DrawnActuator, drawn_actuators
 
 WRINKLING_COLOURS = (
@@ -94,7 +95,7 @@ class Scene:
     """Forces by the frame that they act on, and those of contacts."""
     obstacles: Sequence[DrawnObstacle] = ()
     """The obstacles around it."""
-    contacts: Mapping[str, DrawnContact] = field(default_factory=dict)
+    contacts: Mapping[str, Contact] = field(default_factory=dict)
     """Where it touches them."""
     capsules: Sequence[DrawnObstacle] = ()
     """What touches of a robot of links among obstacles."""
@@ -256,7 +257,7 @@ def _level(left: float, saturated: bool) -> int:
     return next(level for level, (least, _) in enumerate(WRINKLING_COLOURS) if left >= least)
 
 
-def _arrows(model: SoftModel, load: Load, q: FloatArray, contacts: Mapping[str, DrawnContact]) -> dict[str, Arrow]:
+def _arrows(model: SoftModel, load: Load, q: FloatArray, contacts: Mapping[str, Contact]) -> dict[str, Arrow]:
     """Forces of a load by frame, at a configuration, shape (nq,), and those of contacts by their names."""
     arrows = {
         frame: Arrow.of(wrench[:3], np.array(frame_placement(model, q, frame).translation))

@@ -10,10 +10,12 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
-from softrobots.environment.capsules import robot_capsules
+from softrobots.description.rigid_tree import capsule_shape
+from softrobots.environment.capsules import capsule_tags
 from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.contact.contact import Contact
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.view.mesh_triangles import Triangles
 
@@ -30,19 +32,6 @@ class DrawnObstacle(NamedTuple):
     """A `coal` shape, or the `softrobots.view.mesh_triangles.Triangles` of others."""
     pose: FloatArray
     """Pose of the axes of the geometry in the world, shape (4, 4) [m]."""
-
-
-class DrawnContact(NamedTuple):
-    """A place where a robot touches an obstacle, or itself."""
-
-    obstacle: str
-    """Name of the obstacle."""
-    point: FloatArray
-    """Position on the surface of the robot, shape (3,) [m], world axes."""
-    force: FloatArray
-    """Force on the robot, shape (3,) [N], world axes."""
-    status: str
-    """`Contact.status`."""
 
 
 def drawn_obstacles(
@@ -66,13 +55,13 @@ def drawn_obstacles(
     return tuple(DrawnObstacle(str(one.name), *_solid(one, centre, size, ground)) for one in environment)
 
 
-def drawn_contacts(equilibrium: Equilibrium) -> dict[str, DrawnContact]:
+def drawn_contacts(equilibrium: Equilibrium) -> dict[str, Contact]:
     """Return the contacts of an equilibrium, by link, obstacle and a number where they touch in several places."""
-    found: dict[str, DrawnContact] = {}
+    found: dict[str, Contact] = {}
     for contact in equilibrium.contacts:
         place = f"{contact.link}/{contact.obstacle}"
         number = sum(name.startswith(f"{place}/") for name in found)
-        found[f"{place}/{number}"] = DrawnContact(contact.obstacle, contact.point, contact.force, contact.status)
+        found[f"{place}/{number}"] = contact
     return found
 
 
@@ -81,21 +70,18 @@ def drawn_capsules(model: SoftModel, q: FloatArray) -> tuple[DrawnObstacle, ...]
     if model.structure.section_table:
         return ()
     pin_model, data = model.workspace(None)
-    pin.forwardKinematics(pin_model, data, q)
+    pin.framesForwardKinematics(pin_model, data, q)
     drawn = []
-    for one in robot_capsules(model):
-        start, end = (np.array(data.oMi[one.joint].act(point)) for point in (one.start, one.end))
-        length, pose = float(np.linalg.norm(one.end - one.start)), np.eye(4)
-        pose[:3, 3] = 0.5 * (start + end)
-        if length > 0.0:
-            pose[:3, :3] = pin.Quaternion.FromTwoVectors(np.array((0.0, 0.0, 1.0)), (end - start) / length).matrix()
-        drawn.append(DrawnObstacle(one.link, _capsule(one.radius, length), pose))
+    for tag in capsule_tags(model):
+        shape = capsule_shape(tag)
+        placement = data.oMf[model.frame_id(tag.link)] * pin.SE3(shape.placement.rotation, shape.placement.position)
+        drawn.append(DrawnObstacle(tag.link, _capsule(*shape.size), placement.homogeneous))
     return tuple(drawn)
 
 
 @lru_cache(maxsize=256)
-def _capsule(radius: float, length: float) -> Triangles:
-    """Triangles of a capsule along z."""
+def _capsule(radius: float, length: float = 0.0) -> Triangles:
+    """Triangles of a capsule along z, or of a sphere."""
     from trimesh.creation import capsule
 
     solid = capsule(height=length, radius=radius, count=_ROUND)

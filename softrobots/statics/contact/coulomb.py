@@ -80,11 +80,6 @@ class Balance(NamedTuple):
     laws: Laws
     """What each contact does."""
 
-    @property
-    def sticks(self) -> Any:
-        """Which contacts press and stick, shape (m,), bool."""
-        return self.laws.sticks
-
 
 class Laws(NamedTuple):
     """What each contact does at an iterate, in units in which springs and contacts have stiffness 1."""

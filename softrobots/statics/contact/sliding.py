@@ -196,7 +196,7 @@ class SlidingRobot:
 
     def work(self, found: Balance) -> float:
         """Return the work against friction in the step, by the mean of the normal forces at its two ends [J]."""
-        slips = np.flatnonzero(self.pressed(found) & ~found.sticks)
+        slips = np.flatnonzero(self.pressed(found) & ~found.laws.sticks)
         slid = np.linalg.norm(found.contacts.sliding[slips], axis=1)
         now = found.normal[slips].tolist()
         before = [self.last.forces.get(self.at.gaps.keys[row], (force,))[0] for row, force in zip(slips, now, strict=True)]
