@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from tests.support.laws import law
-from tests.support.planar_robots import block, ladder, rope
+from tests.support.planar_robots import block, ladder, rail, rope
 
 FLOOR = sr.Environment([sr.HalfSpace((0, 0, 1))])
 
@@ -102,6 +102,39 @@ def test_a_ladder_on_two_walls_slips_at_the_pull_of_the_closed_form() -> None:
     assert [one.status for one in path.contacts[3]] == ["slips", "slips"]
     first = min(event.parameter for event in path.events if event.kind == "slips")
     assert first == pytest.approx(2.0, abs=0.05)  # radius over length, 1e-5, of a pull that changes by 1e-3, and the last step
+
+
+def test_what_friction_wedges_against_the_floor_springs_off_it() -> None:
+    """A ball on an inclined rail with mu > tan(angle): past the cone no sliding opposes its friction, only free space is left.
+
+    With the compliance W of the springs that is W_zz < mu W_xz: friction that acts down the rail closes the gap by more than
+    the normal force opens it (A. Klarbring, Examples of non-uniqueness and non-existence of solutions to quasistatic contact
+    problems with friction, Ingenieur-Archiv 60, 1990).
+    """
+    angle, friction, pushed = 0.3, 0.6, 0.1
+    ways = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])
+    stiffness = ways.T @ np.diag([50.0, 5000.0]) @ ways  # of the tip along x and z
+    compliance = np.linalg.inv(stiffness)
+    assert compliance[1, 1] < friction * compliance[0, 1]
+    limit = (stiffness[0, 1] + stiffness[0, 0] / friction) * -pushed  # pull along z at which it leaves the cone
+    assert limit > 0.0  # it is held down by friction alone
+    pulls = np.array([-10.0, -10.0, 0.9 * limit, 1.1 * limit])
+    path = sr.follow_contact(
+        rail(angle, 50.0, 5000.0),
+        [[0.0], [pushed], [pushed], [pushed]],
+        np.outer(pulls, (0, 0, 1)),
+        environment=FLOOR,
+        friction=friction,
+    )
+    assert [[one.status for one in row] for row in path.contacts] == [["sticks"], ["sticks"], ["sticks"], []]
+    (jump,) = path.jumps
+    assert jump.parameter == pytest.approx(2.5, abs=2.0**-13)
+    free = compliance @ (0.0, limit) + (pushed, 0.1)
+    assert jump.after.tip_position[[0, 2]] == pytest.approx(
+        free, rel=1e-4
+    )  # of the last step, 2^-14 of a row that changes the pull by a fifth
+    away = free - (0.0, 0.1)
+    assert jump.energy_lost == pytest.approx(0.5 * away @ stiffness @ away, rel=1e-3)
 
 
 @pytest.mark.study

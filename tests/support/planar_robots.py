@@ -36,6 +36,17 @@ def block(stiffness: float = 100.0, upward: float = 50.0, radius: float = 0.1) -
     return robot(("base", "cart", "slide", "tip"), joints, [("tip", "0 0 0", "0 0 0", radius)])
 
 
+def rail(angle: float, soft: float, stiff: float, radius: float = 0.1) -> sr.SoftModel:
+    """A ball on the plane z = 0 that a motor pushes: by a soft spring up an inclined rail, by a stiff one across."""
+    joints = [
+        joint("push", "prismatic", "base", "cart", "1 0 0", origin=f'xyz="0 0 {1.0 + radius}"'),
+        joint("along", "prismatic", "cart", "slide", "1 0 0", soft, f'rpy="0 {-angle} 0"'),
+        joint("across", "prismatic", "slide", "held", "0 0 1", stiff),
+        joint("end", "fixed", "held", "tip", "", origin=f'xyz="{-math.sin(angle)} 0 {-math.cos(angle)}"'),
+    ]
+    return robot(("base", "cart", "slide", "held", "tip"), joints, [("tip", "0 0 0", "0 0 0", radius)])
+
+
 def ladder(length: float, angle: float, radius: float, soft: float) -> sr.SoftModel:
     """A ladder of an angle to the floor with its foot's centre at the radius above the origin, kept by very soft springs."""
     joints = [

@@ -9,6 +9,7 @@ of friction, until it rests. That motion only lowers the energy, and stops at eq
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
@@ -31,6 +32,7 @@ _FAR_MOVING = 0.2  # the same in a step of overdamped motion
 _MOST_MOMENTS = 400  # steps of the overdamped motion
 _STRONGEST = 1e6  # brake that is given up at, over the stiffness of the springs
 _STANDS, _PUSH = 1e-8, 1e-3  # change of the springs that is none, and that of a push [rad]
+_OPENS = 1e-6  # of the normal force, by which it is drawn to begin with
 _NEARLY_AT_REST = 0.02  # change of the springs below which the motion may have arrived
 
 
@@ -93,7 +95,7 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
     model, (sliding, here) = given.model, carried_over(given, last)
     brake, work = 1.0, 0.0
     for _ in range(_MOST_MOMENTS):
-        there = settle(given, sliding, here, brake)
+        there = settle(given, sliding, here, brake) or settle(given, let_go(sliding), here, brake)
         moved = np.inf if there is None else change(model, there.q_springs, here)
         if there is None or moved > _FAR_MOVING:
             brake *= 4.0
@@ -110,6 +112,16 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
                 here, brake = here + _PUSH * there.robot.softest(there.found)[1], 1.0
             brake *= 0.5
     return None
+
+
+def let_go(last: Sliding) -> Sliding:
+    """Return the same with contacts that are taken as open at first.
+
+    Where friction closes a gap by more than the normal force opens it, nothing but free space follows the edge of the cone (A.
+    Klarbring, Examples of non-uniqueness and non-existence of solutions to quasistatic contact problems with friction,
+    Ingenieur-Archiv 60, 1990).
+    """
+    return replace(last, forces={key: (-_OPENS * force, np.zeros(3)) for key, (force, _) in last.forces.items()})
 
 
 def energy_drop(given: Given, last: Rest, rest: Rest) -> float:
