@@ -208,3 +208,13 @@ class Environment:
 def check_environment(environment: Any) -> Environment:
     """Return `environment` if it is an `Environment`, or raise ParameterError."""
     return instance_of("environment", environment, Environment, "an Environment, such as Environment([HalfSpace((0, 0, 1))])")
+
+
+def fixed_environment(environment: Any) -> Environment:
+    """Return `environment` if it is one whose obstacles stand still, or raise ParameterError."""
+    checked = check_environment(environment)
+    moved = [str(obstacle.name) for obstacle in checked if obstacle.moves]
+    if moved:
+        requirement = f"one whose obstacles stand still, environment.at(parameter): {', '.join(moved)} would move"
+        raise ParameterError("environment", environment, requirement)
+    return checked

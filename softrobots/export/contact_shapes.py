@@ -19,7 +19,7 @@ from softrobots.description.urdf_tags import CapsuleTag
 from softrobots.environment.capsules import capsule_tags
 from softrobots.environment.convex_mesh import Mesh
 from softrobots.environment.cores import cores_of
-from softrobots.environment.environment import Environment, check_environment
+from softrobots.environment.environment import fixed_environment
 from softrobots.environment.obstacles import Box, HalfSpace, Obstacle
 from softrobots.environment.self_contact import self_contact_pairs
 from softrobots.model.soft_model import SoftModel
@@ -67,16 +67,6 @@ def contact_shapes(model: SoftModel, environment: Any, friction: Any) -> Contact
         friction=coefficient,
         apart=_apart(model) if checked.self_contact else None,
     )
-
-
-def fixed_environment(environment: Any) -> Environment:
-    """Return `environment` if it is one whose obstacles stand still, or raise ParameterError."""
-    checked = check_environment(environment)
-    moved = [str(obstacle.name) for obstacle in checked if obstacle.moves]
-    if moved:
-        requirement = f"one whose obstacles stand still, environment.at(parameter): {', '.join(moved)} would move"
-        raise ParameterError("environment", environment, requirement)
-    return checked
 
 
 def with_capsules(tree: RigidTree, capsules: Sequence[CapsuleTag]) -> RigidTree:

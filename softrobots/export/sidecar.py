@@ -16,8 +16,7 @@ from softrobots.description.actuator_reader import NUMBERS
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import CapsuleTag, FrictionTag, LumpedSectionTag, SectionTag, SpringTag
-from softrobots.environment.environment import Environment
-from softrobots.export.contact_shapes import fixed_environment
+from softrobots.environment.environment import Environment, fixed_environment
 from softrobots.export.number_sources import Rules, derived_numbers, number_rules
 from softrobots.inflated_beam import wrinkling_moment
 from softrobots.model.soft_model import SoftModel, check_model

@@ -13,7 +13,7 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
-from softrobots.environment.environment import Environment, check_environment
+from softrobots.environment.environment import Environment, fixed_environment
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel, check_model
 
@@ -112,8 +112,8 @@ class Load:
                 model.frame_id(name)
                 field = f"wrench[{name!r}]" if isinstance(wrench, Mapping) else "wrench"
                 total[name] = total.get(name, 0.0) + finite_array(field, value, (6,), "N, N m")
-        if environment is not None and check_environment(environment).moves:
-            raise ParameterError("environment", environment, "obstacles at rest: environment.at(parameter)")
+        if environment is not None:
+            fixed_environment(environment)
         if gravity is None:
             return cls(total, None, environment)
         x, y, z = finite_array("gravity", gravity, (3,), "m/s^2").tolist()
