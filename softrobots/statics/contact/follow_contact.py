@@ -146,11 +146,8 @@ class Course:
                 raise ParameterError(name, self._columns[name], f"one row, or {count}, one a parameter")
         self.parameters = np.arange(count, dtype=np.float64) if given is None else given
         """Parameter of each row, shape (n,)."""
-        self._frames = (
-            {name: key for key in loads.get("wrench", {}) for name in [f"wrench[{key!r}]"]}
-            if isinstance(loads["wrench"], Mapping)
-            else {}
-        )
+        wrench = loads["wrench"]
+        self._frames = {f"wrench[{key!r}]": key for key in wrench} if isinstance(wrench, Mapping) else {}
         for parameter in self.parameters.tolist():
             self._environment.at(parameter)
         self._last: tuple[Any, ...] = (None, None, None)
