@@ -129,6 +129,11 @@ def test_a_folded_arm_rests_with_its_tip_on_its_base() -> None:
     assert contact.normal_force == pytest.approx(150.0 * (best.x @ slope) / (slope @ slope), rel=1e-6)
     assert abs(contact.gap) < 1e-12
     assert found.stable
+    motors = (0.0, 0.5, -2.0, -2.0)
+    (rubs,) = sr.follow_contact(found.model, motors, environment=found.environment, friction=0.3, start=found).equilibria
+    assert [(one.link, one.obstacle, one.with_itself) for one in (contact, *rubs.contacts)] == [
+        ("link_3", "link_1_root", True)
+    ] * 2
 
 
 def test_a_fold_through_the_arm_itself_is_left_or_named() -> None:
