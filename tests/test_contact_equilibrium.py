@@ -387,3 +387,18 @@ def test_a_start_inside_of_an_obstacle_without_a_near_way_out_is_bent_aside() ->
     tally = contact_cases.judge(random, 101, range(122, 123))
     assert tally.broken == []
     assert sum(count for outcome, count in tally.outcomes.items() if outcome.isdecimal()) == 1
+
+
+def test_a_stretched_arm_bends_aside_where_a_wall_is_too_near(arm: sr.SoftModel) -> None:
+    """Its tip moves along the wall's normal to second order, by half of `a^T M a`: the force is that of buckling."""
+    nearer = 0.01
+    wall = sr.Environment([sr.HalfSpace((-1, 0, 0), nearer - 2 * LINK - BODY, name="wall")])
+    found = sr.solve_equilibrium(arm, (0, 0, 0), environment=wall)
+    (contact,) = found.contacts
+    assert found.stable
+    assert found.tip_position[0] == pytest.approx(2 * LINK - nearer, abs=1e-11)
+    shortening = np.array([[2 * LINK - HINGE, LINK - HINGE], [LINK - HINGE, LINK - HINGE]])
+    buckling = STIFFNESS / np.linalg.eigvalsh(shortening)[-1]
+    assert contact.normal_force == pytest.approx(buckling, rel=nearer)  # 1 + O(shortening)
+    with pytest.raises(sr.EquilibriumNotFound, match=r"'link_1_root' is .* inside of 'ball', wherever the springs are"):
+        sr.solve_equilibrium(arm, (0, 0.9, -0.4), environment=sr.Environment([sr.Sphere(0.05, (0, 0, 0.02), name="ball")]))

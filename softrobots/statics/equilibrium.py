@@ -99,7 +99,7 @@ def solve_equilibrium(
 def _hint(best: Equilibrium, state: ElasticState) -> str:
     """Advice for the error message."""
     if state.touch is not None and state.touch.penetration > TOUCHING * best.model.reach:
-        return f"; {deepest_penetration(state.touch)}"
+        return f"; {deepest_penetration(state.touch, state.point)}"
     ends = best.model.structure.at_range_end(best.q_motors, best.q_springs)
     if ends:
         return (

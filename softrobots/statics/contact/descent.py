@@ -20,7 +20,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import softest_motion
 from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step, repairing_step
-from softrobots.statics.contact.touch import NO_FORCES, TOUCHING, ForceTable, Touch
+from softrobots.statics.contact.touch import NO_FORCES, TOUCHING, ForceTable, Touch, unmoved
 from softrobots.statics.elastic_state import ElasticProblem, ElasticState, largest_residual, norm
 
 BALANCED = 1.0
@@ -131,7 +131,7 @@ class ContactSearch:
     def blocked(self, here: Near) -> bool:
         """Whether something penetrates that no spring moves."""
         deep = here.touch.gaps.values < -TOUCHING * self._reach
-        return bool(deep.any()) and not here.touch.rows[deep].any(axis=1).all()
+        return bool((deep & unmoved(here.touch, here.state.point)).any())
 
     def _way_out(self, here: Near) -> tuple[bool, Step | None]:
         """Certify an equilibrium; or step out of an unstable one along its softest motion that the contacts leave.

@@ -8,7 +8,7 @@ With gaps :math:`g_i(y)` and normal forces :math:`\lambda_i`, the contacts load 
 from __future__ import annotations
 
 import threading
-from typing import NamedTuple
+from typing import Any, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -169,10 +169,18 @@ def _nonnegative(gradients: FloatArray, load: FloatArray) -> FloatArray:
     return best if found is None else np.maximum(found[0], 0.0)
 
 
-def deepest_penetration(touch: Touch) -> str:
+def unmoved(touch: Touch, point: Point) -> Any:
+    """Whether no elastic coordinate moves the capsule of each candidate, shape (m,), bool.
+
+    That is more than a gradient of zero, which a stretched arm has that stands against a wall: it gives way by bending.
+    """
+    return np.asarray(~(touch.rows.any(axis=1) | point.columns(touch.gaps.moves)[1].any(axis=1)))
+
+
+def deepest_penetration(touch: Touch, point: Point) -> str:
     """Return what penetrates most, in words; rather what no spring moves."""
     depths = np.maximum(-touch.gaps.values, 0.0)
-    fixed = depths * ~touch.rows.any(axis=1)
+    fixed = depths * unmoved(touch, point)
     place = int((fixed if fixed.any() else depths).argmax())
     link, other, _ = touch.surroundings.pair(touch.gaps, place)
     advice = ", wherever the springs are: move the motors or the obstacle" if fixed.any() else ""
