@@ -388,3 +388,14 @@ def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
         sr.follow_trajectory(found.model, [(0.9, 0.3, 0.2)], method="paper", times=[0.0], **options)
     with pytest.raises(sr.ParameterError, match="method"):
         sr.estimate_load(found.model, MOTORS, found.motor_torques, method="alternation", **options)
+
+
+def test_a_load_estimate_on_a_wall_leaves_out_what_only_the_wall_feels() -> None:
+    """The tip's round end leans on the wall: a force along the normal passes into it, and is in the contact instead."""
+    arm, motors, force = sr.load_model(sr.InflatableArm()), (0, 0.9, -0.4), (0, 0, -41.0)
+    wall = sr.Environment([sr.HalfSpace((-1, 0, 0), -1.0)])
+    leaning = sr.solve_equilibrium(arm, motors, force, environment=wall)
+    found = sr.estimate_load(arm, motors, leaning.motor_torques, environment=wall)
+    assert abs(found.unobservable_directions) == pytest.approx(np.array([[1.0, 0.0, 0.0]]), abs=1e-9)
+    assert found.force == pytest.approx(force, abs=1e-6)
+    assert found.equilibrium.contacts[0].normal_force == pytest.approx(leaning.contacts[0].normal_force, abs=1e-6)

@@ -150,7 +150,7 @@ def newton(problem: MeasuredTorques, most: int, *, restart: bool) -> list[Explan
     no_force = np.zeros(3)
     relaxed = elastic_state(model, problem.motors, model.rest, problem.load(no_force))
     start = problem.equilibrium(no_force, relaxed) or relaxed
-    best = _search(problem, no_force, start, most)
+    best = _without_hidden(problem, _search(problem, no_force, start, most), most)
     if not restart:
         return [best]
     size, others = problem.elastic_force, list[Explanation]()
@@ -198,6 +198,19 @@ SOLVERS: dict[str, Callable[..., list[Explanation]]] = {"newton": newton, "alter
 def _search(problem: MeasuredTorques, force: FloatArray, state: ElasticState, most: int) -> Explanation:
     found = search_force(problem, state, most, reach=problem.model.reach, tolerance=problem.tolerance, start=force)
     return problem.explanation(*found)
+
+
+def _without_hidden(problem: MeasuredTorques, found: Explanation, most: int) -> Explanation:
+    """Take off what no motor feels of a force on a robot that leans on an obstacle, which passes on to the obstacle.
+
+    The search may come to the obstacle with a force that the motors felt before.
+    """
+    right, keep = found.directions.right, found.directions.observable
+    if problem.base.environment is None or not found.state.touch.forces.any() or keep.all():  # type: ignore[union-attr]
+        return found
+    hidden = np.concatenate([right[: len(keep)][~keep], right[len(keep) :]])
+    other = _search_from(problem, found.force - hidden.T @ (hidden @ found.force), found.state, most)
+    return other if other is not None and problem.residual(other.state) <= problem.tolerance else found
 
 
 def _search_from(problem: MeasuredTorques, force: FloatArray, near: ElasticState, most: int) -> Explanation | None:
