@@ -135,6 +135,7 @@ def follow_trajectory(
     gain: float = 50.0,
     allow_jumps: bool = False,
     environment: Environment | None = None,
+    friction: float = 0.0,
     progress: bool | str = False,
 ) -> Trajectory:
     """Find motor coordinates that move the loaded tip through target positions, or poses.
@@ -162,6 +163,7 @@ def follow_trajectory(
         allow_jumps: Where a waypoint cannot be reached from the last one by a continuous motion (a motor limit, a turn of the
             base under a tip that passes over it), go on from the nearest other solution instead of raising.
         environment: Obstacles that the robot may lean on without friction, only with "newton"; None: free space.
+        friction: Must be 0, no friction at contacts; `follow_contact` follows motors with it.
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
@@ -177,6 +179,10 @@ def follow_trajectory(
         EquilibriumNotFound: If a waypoint has no equilibrium.
     """
     choice("method", method, METHODS if environment is None else METHODS[:1])
+    if friction != 0.0:
+        raise ParameterError(
+            "friction", friction, "0: motors for a tip are sought without friction; follow_contact follows given motors with it"
+        )
     model = untouched(check_model(model))
     goals = Goal.path(targets)
     points = np.array([goal.position for goal in goals])

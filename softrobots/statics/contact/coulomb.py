@@ -147,7 +147,7 @@ def solve_step(step: Step, start: FloatArray, coefficient: float) -> tuple[Balan
     start_place, spent = step.mark(), 0
     for halvings, most in ((1, _FULL_STEPS), (_HALVINGS, MOST_EVALUATIONS)):
         step.return_to(start_place)
-        here, first = _balance(step, start, np.zeros(0), np.zeros((0, 2)), coefficient, step.stiffness), spent
+        here, first = _balance(step, start, np.zeros(0), np.zeros((0, 2)), coefficient, step.stiffness, True), spent
         spent += 1
         while here is not None and spent < first + most:
             if _converged(step, here):
@@ -191,9 +191,15 @@ def balance_of(step: Step, y: FloatArray, near: NearContacts, normal: FloatArray
 
 
 def _balance(
-    step: Step, y: FloatArray, normal: FloatArray, friction: FloatArray, coefficient: float, scale: FloatArray
+    step: Step,
+    y: FloatArray,
+    normal: FloatArray,
+    friction: FloatArray,
+    coefficient: float,
+    scale: FloatArray,
+    first: bool = False,
 ) -> Balance | None:
-    """Evaluate all equations; None out of the range of a section."""
+    """Evaluate all equations; None out of the range of a section. At `first` no contact of the last state is taken as open."""
     near = step.contacts(y)
     if near is None:
         return None
@@ -201,7 +207,8 @@ def _balance(
     root = np.sqrt(scale)
     unit_normal = _unit_force(near.gradients, root, step.reach)
     unit_friction = np.minimum(_unit_force(near.jacobian, root, step.reach).min(axis=1, initial=np.inf), unit_normal)
-    pressed = normal > _OPENING * unit_normal**2 * near.gaps
+    gaps = np.minimum(near.gaps, 0.0) if first else near.gaps
+    pressed = normal > _OPENING * unit_normal**2 * gaps
     rubs = pressed & (coefficient > 0.0)
     tried = friction - (unit_friction**2)[:, None] * near.sliding
     size, radius = np.linalg.norm(tried, axis=1), coefficient * np.maximum(normal, 0.0)
