@@ -59,16 +59,17 @@ def find_candidates(
         distances = field.distance(ends)
         touching = distances <= end_limits
         if len(cores.at_base):
-            touching[cores.at_base] &= ~_stands_on(field, cores, ends, distances)
+            _leave_out_base(touching, field, cores, ends, distances)
         near, which = touching.nonzero()
-        of_ends = _ends(field, cores, ends, near, which, limits)
-        if isinstance(field, HalfSpaces):
-            found.append(of_ends.numbered(numbers))
-            continue
-        # the distance changes by at most the length of the way: what is far at both ends is far between them
-        least = 0.5 * (distances[cores.end_numbers].sum(axis=1) - cores.lengths[:, None])
-        one, other = np.nonzero((least <= limits[:, None]) & (cores.lengths > 0.0)[:, None])
-        found.append(_with_inner(of_ends, places, one, other, limits, merged).numbered(numbers))
+        one = other = near[:0]
+        if not isinstance(field, HalfSpaces):
+            # the distance changes by at most the length of the way: what is far at both ends is far between them
+            one, other = (
+                distances.take(cores.end_numbers, 0).sum(axis=1) <= (2.0 * limits + cores.long_ways)[:, None]
+            ).nonzero()
+        if len(near) or len(one):
+            of_ends = _ends(field, cores, ends, near, which, limits)
+            found.append(_with_inner(of_ends, places, one, other, limits, merged).numbered(numbers))
     if pairs is not None:
         found.append(_own(cores, places, pairs, ends, limits, margin, merged, sum(len(numbers) for _, numbers in fields)))
     parts = [(one.field, one.which) for one in found]
@@ -99,17 +100,15 @@ class _Found(NamedTuple):
         return _Found(self.field, *(column.take(chosen, 0) for column in self[1:]))
 
 
-def _stands_on(field: Field, cores: Cores, ends: FloatArray, distances: FloatArray) -> Any:
-    """Whether the end at the base that belongs to each of `at_base` is inside of each body, shape (k, n).
+def _leave_out_base(touching: Any, field: Field, cores: Cores, ends: FloatArray, distances: FloatArray) -> None:
+    """Clear `touching`, shape (ends, bodies), where an end is `at_base`, and the end there is inside of the body.
 
     There the robot stands on the body, with a flat end: its capsules have caps, which are no contact.
     """
-    radii = cores.radii[cores.end_capsules[cores.bases]]
-    inside = distances[cores.bases] < radii[:, None]
-    rows, which = inside.nonzero()
+    rows, which = (distances.take(cores.bases, 0) < cores.base_radii).nonzero()
     if len(rows):  # `distance` was a lower bound
-        inside[rows, which] = field.at(ends[cores.bases[rows]], which)[0] < radii[rows]
-    return inside
+        inside = field.at(ends[cores.bases[rows]], which)[0] < cores.base_radii[rows, 0]
+        touching[cores.at_base[rows[inside]], which[inside]] = False
 
 
 def _ends(field: Field, cores: Cores, ends: FloatArray, near: Any, which: Any, limits: FloatArray) -> _Found:

@@ -41,6 +41,8 @@ class Cores:
         self.radii = np.array([one.radius for one in self.capsules])
         self.joints = np.array([one.joint for one in self.capsules], dtype=np.intp)
         self.lengths = np.array([float(np.linalg.norm(one.end - one.start)) for one in self.capsules])
+        self.long_ways = np.where(self.lengths > 0.0, self.lengths, -np.inf)
+        """Lengths of the cores; minus infinity of points, which have no inside."""
         self._model, self._data = model.workspace(None)
         self._numbers, self.carrier = np.unique(self.joints, return_inverse=True)
         self._numbers = self._numbers.tolist()
@@ -56,6 +58,8 @@ class Cores:
         """Place of start and end of each core among the different ends, shape (n, 2)."""
         self.at_base, self.bases = self._at_base(moving[self.single_ends])
         """Different ends at the base, with an end within their radius that no joint moves, and that end, both of shape (k,)."""
+        self.base_radii = self.radii[self.end_capsules[self.bases]][:, None]
+        """Radii of the latter, shape (k, 1) [m]."""
 
     def at(self, q: FloatArray) -> CorePlaces:
         """Return the cores at Pinocchio's configuration, shape (nq,)."""

@@ -134,11 +134,11 @@ class Gaps:
         if not len(rows):
             return JointLoad(np.zeros(nv), np.zeros((0, nv)), np.zeros((0, nv)), None, None, 0.0, 0.0)
         normals, moves = self.normals.take(rows, 0), self._cores.moves.take(self.capsules.take(rows), 0)
-        points = self.core_points.take(rows, 0)
+        points, vectors = self.core_points.take(rows, 0), forces.take(rows, 0)
         if normal:
-            vectors = forces.take(rows)[:, None] * normals
+            vectors = vectors[:, None] * normals
         else:
-            vectors, points = forces.take(rows, 0), points - self.radii.take(rows)[:, None] * normals
+            points = points - self.radii.take(rows)[:, None] * normals
         if len(self._own_rows):  # the other capsule takes the opposite force
             chosen = np.flatnonzero(self.obstacles[rows] >= len(self._transforms))
             own, others = rows[chosen], self.obstacles[rows[chosen]] - len(self._transforms)
@@ -148,12 +148,12 @@ class Gaps:
         jacobian, moves = self.places.jacobian, moves[:, None, :]
         linear, angular = (jacobian[:3] - skew(points) @ jacobian[3:]) * moves, jacobian[3:] * moves
         return JointLoad(
-            torque=vectors.ravel().dot(linear.reshape(-1, nv)),
+            torque=vectors.reshape(-1).dot(linear.reshape(-1, nv)),
             angular=angular.reshape(-1, nv),
-            by_force=(-skew(vectors) @ linear).reshape(-1, nv),
+            by_force=(skew(vectors).swapaxes(1, 2) @ linear).reshape(-1, nv),
             by_moment=None,
             gravity_derivative=None,
-            potential=-float(vectors.ravel().dot(points.ravel())),
+            potential=-float(vectors.reshape(-1).dot(points.reshape(-1))),
             scale=self._reach * float(np.sqrt((vectors * vectors).sum(axis=1)).sum()),
         )
 

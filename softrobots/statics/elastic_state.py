@@ -19,7 +19,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.coordinates import Point, ReducedLoad
 from softrobots.model.friction_coordinates import MOST_ROUNDS, SAME_FRICTION, gripped
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.contact.touch import NO_FORCES, ForceTable, NearSurfaces, Touch, joined, resting_forces
+from softrobots.statics.contact.touch import NEAR, NO_FORCES, ForceTable, NearSurfaces, Touch, joined, resting_forces
 from softrobots.statics.loads import AppliedLoad, Load
 
 TOLERANCE = 1e-10
@@ -74,10 +74,11 @@ class ElasticProblem:
         self._applied = AppliedLoad(model, load)
         self._surfaces = None if load.environment is None else NearSurfaces(model, load.environment)
 
-    def state(self, q_springs: FloatArray, forces: ForceTable = NO_FORCES) -> ElasticState:
+    def state(self, q_springs: FloatArray, forces: ForceTable = NO_FORCES, near: float = NEAR) -> ElasticState:
         """Evaluate residual, tangent stiffness and energy at elastic coordinates, shape (n_springs,) [rad or m].
 
-        In contact with obstacles with the forces given; the tangent stiffness is the Hessian of the Lagrangian then.
+        In contact with obstacles with the forces given; the tangent stiffness is the Hessian of the Lagrangian then. Gaps
+        below `near` times the reach are seen.
         """
         point = self._coordinates.at(self.q_motors, q_springs)
         if not point.valid:
@@ -87,7 +88,7 @@ class ElasticProblem:
         if self._surfaces is None:
             reduced = point.reduce(joints)
         else:
-            touch = self._surfaces.at(self.model.embed(point.joints), point, forces)
+            touch = self._surfaces.at(self.model.embed(point.joints), point, forces, near)
             joints = joined(joints, touch.load)
             reduced = _with_curvature(point, point.reduce(joints), touch)
         stored, torques, stiffness = self._springs.at(q_springs)

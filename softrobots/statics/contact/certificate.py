@@ -43,8 +43,8 @@ def active_contacts(touch: Touch, reach: float, rounding: float) -> ActiveContac
         rounding: Residual that counts as none [N m]; a force that loads the springs by less is none.
     """
     touching = (touch.gaps.values <= TOUCHING * reach) | (touch.forces > 0.0)
-    pressed = touch.forces * np.linalg.norm(touch.rows, axis=1) > rounding
-    return ActiveContacts(np.flatnonzero(touching), np.flatnonzero(pressed), np.flatnonzero(touching & ~pressed))
+    pressed = touch.forces * np.sqrt(np.einsum("ij,ij->i", touch.rows, touch.rows)) > rounding
+    return ActiveContacts(touching.nonzero()[0], pressed.nonzero()[0], (touching & ~pressed).nonzero()[0])
 
 
 def null_space(rows: FloatArray) -> FloatArray:
@@ -74,12 +74,14 @@ def softest_motion(
         unit length in coordinates in which the springs have stiffness 1. Of more than 8 touches without force, or where a
         curvature of zero or less is that of several motions, the touches are left out: the answer is a lower bound.
     """
-    active = active_contacts(touch, reach, rounding)
-    pressed, weak = touch.rows[active.pressed], touch.rows[active.weak]
     if not np.isfinite(tangent).all():
         return -np.inf, np.zeros(len(stiffness))
     soft = 1.0 / np.sqrt(stiffness)
     relative = soft[:, None] * tangent * soft
+    if len(soft) and positive(LDLT(len(soft)), relative - 2.0 * POSITIVE * np.eye(len(soft))):  # on all motions
+        return np.inf, np.zeros(len(soft))
+    active = active_contacts(touch, reach, rounding)
+    pressed, weak = touch.rows[active.pressed], touch.rows[active.weak]
     beside = null_space(pressed * soft) if len(pressed) else np.eye(len(soft))
     form, cone = beside.T @ relative @ beside, (weak * soft) @ beside
     if not len(form) or positive(LDLT(len(form)), form - 2.0 * POSITIVE * np.eye(len(form))):

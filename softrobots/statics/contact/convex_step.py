@@ -15,7 +15,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.statics.contact.quadratic_programme import solve_programme
-from softrobots.statics.elastic_state import positive, scaled
+from softrobots.statics.elastic_state import norm, positive, scaled
 
 _LEAST = 1e-3  # least curvature along which a step is taken, relative to the springs
 _PRICE = 1e3  # of penetration in a step that cannot repair all of it, over usual energies in the box
@@ -65,12 +65,12 @@ def contact_step(
     if damping:
         relative = relative + damping * np.eye(len(soft))
     convex, shift, exact = _convex(relative, gaps, gradients, held, factors)
-    found = solve_programme(convex, pull + shift, gradients, -gaps)
-    if found is not None and shift.any():
+    found = solve_programme(convex, pull if shift is None else pull + shift, gradients, -gaps)
+    if found is not None and shift is not None and shift.any():
         lost = 2.0 * float(found[1].sum()) * max(-float(gaps.min(initial=0.0)), 0.0)
         if not np.array_equal(found[1] > 0.0, held) or float(pull @ found[0]) > lost:  # other contacts are pressed, or uphill
             exact, found = False, solve_programme(convex, pull, gradients, -gaps)
-    if found is None or np.linalg.norm(soft * found[0]) > longest:
+    if found is None or norm(soft * found[0]) > longest:
         exact, found = False, _within(convex, pull, gradients, gaps, longest / soft)
     if found is None or not np.isfinite(found[0]).all():
         return None
@@ -119,19 +119,19 @@ def _within(
 
 def _convex(
     hessian: FloatArray, gaps: FloatArray, gradients: FloatArray, held: Any, factors: Any
-) -> tuple[FloatArray, FloatArray, bool]:
+) -> tuple[FloatArray, FloatArray | None, bool]:
     """Make the Hessian positive.
 
     Where it is positive on the null space of the held gradients, curvature is added across them only; elsewhere eigenvalues on
     the null space are made positive, too.
 
     Returns:
-        The Hessian; what to add to the linear term so that a step that closes the held gaps is still Newton's; and whether the
-        null space was left as it is.
+        The Hessian; what to add to the linear term so that a step that closes the held gaps is still Newton's, or None;
+        and whether the null space was left as it is.
     """
-    shift = np.zeros(len(hessian))
     if positive(factors, hessian):
-        return hessian, shift, True
+        return hessian, None, True
+    shift = None
     _, sizes, right = np.linalg.svd(gradients[held])
     rank = int(np.sum(sizes > 1e-9 * sizes.max(initial=0.0)))
     across, along = right[:rank].T, right[rank:].T

@@ -20,7 +20,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import softest_motion
 from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step, repairing_step
-from softrobots.statics.contact.touch import NO_FORCES, TOUCHING, ForceTable, Touch, unmoved
+from softrobots.statics.contact.touch import NEAR, NO_FORCES, TOUCHING, ForceTable, Touch, unmoved
 from softrobots.statics.elastic_state import ElasticProblem, ElasticState, largest_residual, norm
 
 BALANCED = 1.0
@@ -32,6 +32,7 @@ _SHORTEST = 1e-10  # share of a step below which it is not halved again
 _DEEP = 1e-2  # penetration that is repaired before energies count, and that no step leads into, relative to the reach
 _EXACT = 1e-12  # gap of a pressed contact that is zero, relative to the reach
 _LEAST_DAMPING = 0.02  # of the step after one that was cut, relative to the springs
+_LEAST_SEEN = 0.01  # gaps below this share of the reach are always seen
 _ESCAPE = 0.1  # [rad], step out of an unstable equilibrium
 
 
@@ -44,6 +45,8 @@ class Near(NamedTuple):
     """The surfaces near it."""
     error: float
     """Largest of residual, penetration and gaps of forces, relative to what is required; 1 or less at an equilibrium."""
+    seen: float
+    """Gaps below this share of the reach are seen."""
 
     @property
     def table(self) -> ForceTable:
@@ -66,17 +69,20 @@ class ContactSearch:
         self._stiffness, self._reach = problem.model.stiffness, problem.model.reach
         self._factors, self._price, self._damping = LDLT(len(self._stiffness)), 0.0, 0.0
 
-    def near(self, springs: FloatArray, forces: ForceTable = NO_FORCES) -> Near | None:
-        """Evaluate elastic coordinates, shape (n_springs,), under contact forces; None beyond the range of a section."""
+    def near(self, springs: FloatArray, forces: ForceTable = NO_FORCES, seen: float = NEAR) -> Near | None:
+        """Evaluate elastic coordinates, shape (n_springs,), under contact forces; None beyond the range of a section.
+
+        Gaps below `seen` times the reach are seen.
+        """
         self.spent += 1
-        state = self.problem.state(springs, forces)
+        state = self.problem.state(springs, forces, seen)
         touch = state.touch
         if touch is None or not math.isfinite(state.energy):
             return None
-        values, pressed = touch.gaps.values, touch.forces > 0.0
-        gap = max(touch.penetration, float(values[pressed].max()) if pressed.any() else 0.0)
+        pressed = touch.forces.nonzero()[0]
+        gap = max(touch.penetration, float(touch.gaps.values.take(pressed).max()) if len(pressed) else 0.0)
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
-        return Near(state, touch, max(state.error / allowed, gap / (_EXACT * self._reach)))
+        return Near(state, touch, max(state.error / allowed, gap / (_EXACT * self._reach)), seen)
 
     def descend(self, here: Near) -> tuple[Near, bool]:
         """Descend to an equilibrium; it leaves unstable ones.
@@ -88,6 +94,9 @@ class ContactSearch:
             stable, step = False, None
             if here.error > BALANCED:
                 step = self.step(here)
+                if step is not None and here.seen < min(NEAR, _moved(step.step)):  # further than was looked
+                    wider = self.near(here.state.q_springs, here.table)
+                    here, step = (here, None) if wider is None else (wider, self.step(wider))
             else:
                 stable, step = self._way_out(here)
             found = None if step is None else self._along(here, step)
@@ -100,15 +109,17 @@ class ContactSearch:
         """Step of the quadratic programme over the gaps that it can close."""
         touch, values = here.touch, here.touch.gaps.values
         sizes = np.sqrt(np.einsum("ij,ij->i", touch.rows, touch.rows))
-        near = np.flatnonzero(values <= _LARGEST_STEP * sizes)
-        rows, held = touch.rows[near], touch.forces[near] > 0.0
+        near = (values <= _LARGEST_STEP * sizes).nonzero()[0]
+        rows, held = touch.rows.take(near, 0), touch.forces.take(near) > 0.0
         limits = _LARGEST_STEP, self._damping
-        found = contact_step(here.state.tangent, here.load, values[near], rows, held, self._stiffness, limits, self._factors)
+        found = contact_step(
+            here.state.tangent, here.load, values.take(near), rows, held, self._stiffness, limits, self._factors
+        )
         if found is None:
             return None
         forces = np.zeros(len(values))
         forces[near] = found.forces
-        return found._replace(forces=forces)
+        return Step(found.step, forces, found.exact)
 
     def repaired(self, here: Near) -> Near:
         """Bring a robot that starts deep inside of obstacles towards their surface, bending it little."""
@@ -160,12 +171,11 @@ class ContactSearch:
         """Go along a step as far as energy and penetration allow; None where nothing is gained any more."""
         state, touch = here.state, here.touch
         length = norm(step.step)
-        whole = step.step if length <= _LARGEST_STEP else step.step * (_LARGEST_STEP / length)
-        change = (
-            step.forces - touch.forces if length <= _LARGEST_STEP else (step.forces - touch.forces) * (_LARGEST_STEP / length)
-        )
+        whole, change = step.step, step.forces - touch.forces
+        if length > _LARGEST_STEP:
+            whole, change = whole * (_LARGEST_STEP / length), change * (_LARGEST_STEP / length)
         deep = touch.penetration
-        closes = deep - max(0.0, -float((touch.gaps.values + touch.rows @ whole).min(initial=0.0)))
+        closes = deep - max(0.0, -float((touch.gaps.values + touch.rows @ whole).min())) if deep > 0.0 else 0.0
         downhill = float(here.load @ whole)
         price = max(2.0 * float(step.forces.sum()), 0.5 * self._price, 2.0 * downhill / closes if closes > 0.0 else 0.0)
         predicted, self._price = downhill - price * closes, price
@@ -184,13 +194,14 @@ class ContactSearch:
             return merit <= state.energy + price * deep + _ARMIJO * share * predicted + rounding
 
         share, first = 1.0, self.spent
+        seen = min(NEAR, max(_LEAST_SEEN, 2.0 * _moved(whole)))  # steps shrink: what the next one may touch
         while self.spent < self.most and share > _SHORTEST:
             table = ForceTable.of(touch.gaps, touch.forces + share * change)
-            trial = self.near(state.q_springs + share * whole, table)
+            trial = self.near(state.q_springs + share * whole, table, seen)
             if share == 1.0 and trial is not None and not better(trial, share):
                 back = _back_to_surface(trial.touch, self._stiffness)
                 if back is not None and norm(back) <= norm(whole):
-                    trial = self.near(trial.state.q_springs + back, table)
+                    trial = self.near(trial.state.q_springs + back, table, seen)
             if trial is not None and better(trial, share):
                 cut = self.spent > first + 2
                 self._damping = _LEAST_DAMPING + 4.0 * self._damping if cut else 0.25 * self._damping
@@ -200,6 +211,11 @@ class ContactSearch:
                 break
             share *= 0.5
         return None
+
+
+def _moved(step: FloatArray) -> float:
+    """How far a step of the springs moves the robot at most, relative to the reach."""
+    return norm(step) * math.sqrt(len(step))
 
 
 def _back_to_surface(touch: Touch, stiffness: FloatArray) -> FloatArray | None:

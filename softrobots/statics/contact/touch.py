@@ -24,8 +24,10 @@ from softrobots.statics.contact.quadratic_programme import solve_programme
 TOUCHING = 1e-9
 """Largest gap of surfaces that touch, and largest penetration of an equilibrium, relative to the reach."""
 
+NEAR = 0.2
+"""Gaps below this share of the reach are seen, where nothing is known of how far the robot will move."""
+
 _DEPENDENT = 1e-9  # least singular value of independent gradients over the largest
-_NEAR = 0.2  # gaps below this share of the reach are seen
 
 
 class Touch(NamedTuple):
@@ -106,11 +108,14 @@ class NearSurfaces:
         known = _KNOWN.by_model.get(model)
         if known is None or known[0] is not environment:
             known = _KNOWN.by_model[model] = environment, Surroundings(model, environment)
-        self._surroundings, self._margin = known[1], _NEAR * model.reach
+        self._surroundings, self._reach = known[1], model.reach
 
-    def at(self, q: FloatArray, point: Point, forces: ForceTable) -> Touch:
-        """Evaluate gaps and contact load at Pinocchio's configuration, shape (nq,), and the point of the coordinates there."""
-        gaps = self._surroundings.at(q, self._margin)
+    def at(self, q: FloatArray, point: Point, forces: ForceTable, near: float) -> Touch:
+        """Evaluate gaps and contact load at Pinocchio's configuration, shape (nq,), and the point of the coordinates there.
+
+        Gaps below `near` times the reach are seen.
+        """
+        gaps = self._surroundings.at(q, near * self._reach)
         on_motors, on_springs = point.columns(gaps.jacobian)
         each = forces.at(gaps)
         return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._surroundings)
@@ -123,11 +128,13 @@ def joined(applied: JointLoad, contact: JointLoad) -> JointLoad:
     moments = applied.by_moment
     if moments is not None:
         moments = np.concatenate([moments, np.zeros_like(contact.angular)])
-    return applied._replace(
+    return JointLoad(
         torque=applied.torque + contact.torque,
         angular=np.concatenate([applied.angular, contact.angular]),
         by_force=np.concatenate([applied.by_force, contact.by_force]),
         by_moment=moments,
+        gravity_derivative=applied.gravity_derivative,
+        potential=applied.potential,
         scale=applied.scale + contact.scale,
     )
 
