@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -135,6 +136,49 @@ def test_what_friction_wedges_against_the_floor_springs_off_it() -> None:
     )  # of the last step, 2^-14 of a row that changes the pull by a fifth
     away = free - (0.0, 0.1)
     assert jump.energy_lost == pytest.approx(0.5 * away @ stiffness @ away, rel=1e-3)
+
+
+@settings(max_examples=4)
+@given(angle=st.floats(-0.2, 0.2), ways=st.lists(st.floats(-0.1, 0.1), min_size=2, max_size=4))
+def test_a_floor_that_moves_is_a_base_that_moves_back(angle: float, ways: list[float]) -> None:
+    """Objectivity: contact forces, springs and work of friction only know the motion of robot and floor to each other."""
+    model, places, down = rail(angle, 50.0, 500.0), np.array([0.0, *ways]), (0, 0, -10.0)
+    still = sr.Environment([sr.Box((9, 9, 1), position=(0, 0, -0.5))])
+
+    def sideways(parameter: float) -> np.ndarray:
+        pose = np.eye(4)
+        pose[0, 3] = -np.interp(parameter, np.arange(len(places)), places)
+        return pose
+
+    carried = sr.Environment([sr.Box((9, 9, 1), position=(0, 0, -0.5), pose=sideways)])
+    pushed = sr.follow_contact(model, places[:, None], down, environment=still, friction=0.4)
+    moved = sr.follow_contact(model, [0.0], down, environment=carried, friction=0.4, parameters=np.arange(len(places)))
+    for one, other in zip(pushed.equilibria, moved.equilibria, strict=True):
+        assert one.q_springs == pytest.approx(other.q_springs, abs=1e-9)
+        assert [contact.status for contact in one.contacts] == [contact.status for contact in other.contacts]
+        for here, there in zip(one.contacts, other.contacts, strict=True):
+            assert here.force == pytest.approx(there.force, abs=1e-6)
+    assert pushed.dissipation == pytest.approx(moved.dissipation, abs=1e-9)
+    assert pushed.dissipation[-1] >= 0.0
+
+
+@pytest.mark.study
+def test_finer_steps_converge(arm: sr.SoftModel) -> None:
+    """Friction is implicit in time: of first order in the step where the direction of sliding turns."""
+    floor = sr.Environment([sr.HalfSpace((0, 0, 1), -0.1)])
+
+    def end(steps: int) -> np.ndarray:
+        angle = np.linspace(0.0, np.pi, steps + 1)
+        motors = np.column_stack([0.15 * np.sin(angle), 0.1 - 0.1 * np.cos(angle), np.full_like(angle, -0.5)])
+        path = sr.follow_contact(arm, motors, (0, 0, -15), environment=floor, friction=0.3)
+        assert path.contacts[-1][0].status == "slips"
+        return path.equilibria[-1].q_springs
+
+    ends = [end(steps) for steps in (12, 24, 48, 96)]
+    changes = [np.abs(finer - coarser).max() for coarser, finer in pairwise(ends)]
+    assert changes[0] > 1e-6
+    assert changes[1] < 0.65 * changes[0]
+    assert changes[2] < 0.65 * changes[1]
 
 
 @pytest.mark.study
