@@ -176,7 +176,9 @@ class PlainStatics:
             loads[:, places] *= np.where(moment > largest, largest / np.maximum(moment, largest), 1.0)[:, None]
         return np.asarray(loads)
 
-    def _torques(self, case: Case, strains: FloatArray, pushes: Sequence[Push]) -> tuple[FloatArray, FloatArray, FloatArray]:
+    def _torques(
+        self, case: Case, strains: FloatArray, pushes: Sequence[Push] = ()
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Load on every joint, shape (n, nv); the size of the load; and the tip."""
         n = len(strains)
         turns, points = self._bodies(case.motors, strains)
