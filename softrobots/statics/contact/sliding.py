@@ -29,6 +29,7 @@ from softrobots.statics.equilibrium_result import Equilibrium
 from softrobots.statics.loads import AppliedLoad
 
 _TOUCHES = 1e-9  # largest gap of a contact without force, relative to the reach
+_BESIDE = 1e-2  # largest distance between candidates of one contact, relative to the reach
 _SLIPS = 1e-10  # sliding in a step that is none, relative to the reach
 _STRICT = 1e-9  # least force of a contact that counts as held, relative to the largest
 
@@ -99,11 +100,25 @@ class SlidingRobot:
             self._forces = dict(self.last.forces)
         else:
             self._forces = forces_by_key(before.gaps.keys, normal, world(before.tangents, friction))
+        self._pass_on(self.last.gaps if before is None else before.gaps, place.gaps)
         forces = [self._forces.get(key, (0.0, np.zeros(3))) for key in place.gaps.keys]
         along = np.array([force for _, force in forces]).reshape(-1, 3, 1)
         turned = (place.tangents @ along)[:, :, 0]
         kept = np.linalg.norm(along[:, :, 0], axis=1) / np.maximum(np.linalg.norm(turned, axis=1), 1e-300)
         return np.array([force for force, _ in forces]), turned * np.where(kept < 2.0, kept, 1.0)[:, None]
+
+    def _pass_on(self, before: Gaps, now: Gaps) -> None:
+        """Give the force of a candidate that is no more, as of a nearest point that has passed an end, to the one beside it."""
+        keys = set(now.keys)
+        for row, key in enumerate(before.keys):
+            if key in keys or self._forces.get(key, (0.0,))[0] <= 0.0:
+                continue
+            apart = np.linalg.norm(now.points - before.points[row], axis=1)
+            apart[now.obstacles != before.obstacles[row]] = np.inf
+            beside = int(apart.argmin()) if len(apart) else 0
+            if len(apart) and apart[beside] <= _BESIDE * self.reach:
+                normal, friction = self._forces.get(now.keys[beside], (0.0, np.zeros(3)))
+                self._forces[now.keys[beside]] = normal + self._forces[key][0], friction + self._forces[key][1]
 
     def residual(self, normal: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray, float]:
         """Return torque out of balance, its derivative, and the torque that counts as none, at the coordinates asked last."""
