@@ -461,7 +461,7 @@ def test_export_answers_machines(told, tmp_path: Path) -> None:
     status, out, _ = told("export", *words, "-o", str(made), "--json")
     assert status == 0
     counts = {"sections": 0, "springs": 16, "actuators": 6, "welded": True}  # two segments of two hinges, four springs each
-    assert json.loads(out) == {"files": [str(made)], "robot": "pcc_arm", "format": "mjcf", **counts}
+    assert json.loads(out) == {"files": [str(made)], "robot": "pcc_arm", "format": "mjcf", "obstacles": [], **counts}
 
 
 @each_row(
