@@ -20,10 +20,11 @@ from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file, write_text
 from studies.shared.checkout import CHECKOUT
 from studies.shared.recorded_run import check_page, command_of, write_record
-from studies.soak.contact_cases import draw, family_of, judge
-from studies.soak.contact_running import as_json, soak_contact, table
+from studies.soak.contact_cases import draw, judge
+from studies.soak.contact_running import family_of, soak_contact, table
 from studies.soak.plain_contact import PlainBody
 from studies.soak.plain_statics import PlainStatics
+from studies.soak.running import as_json
 
 NAME = "soak_contact"
 _TOLD = 20  # broken cases that are printed

@@ -16,7 +16,7 @@ import softrobots as sr
 from softrobots.environment.capsules import robot_capsules
 from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, HalfSpace, Sphere
-from studies.soak import contact_cases
+from studies.soak import contact_cases, contact_running
 from tests.support.law_robots import PUSHES, directions, model
 from tests.support.oracles import arm_energy
 
@@ -380,7 +380,7 @@ def test_a_slab_is_a_floor_for_a_robot_that_stands_on_it(force: tuple) -> None:
 
 def test_a_start_inside_of_an_obstacle_without_a_near_way_out_is_bent_aside() -> None:
     """The relaxed robot runs through the middle of three obstacles; the energy is that of the equilibrium with them."""
-    random = contact_cases.family_of("arm")
+    random = contact_running.family_of("arm")
     body = contact_cases.PlainBody(contact_cases.PlainStatics(random.robot()))
     case, obstacles = contact_cases.draw(random, body, 101, 122)
     assert body.nearest(obstacles, body.cores(case.motors, np.zeros((1, 4)))[0]).gap.min() < -0.1

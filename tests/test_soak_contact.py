@@ -14,9 +14,10 @@ import pytest
 
 import softrobots as sr
 from studies.soak import contact_cases
-from studies.soak.contact_cases import FAMILIES, family_of, judge
-from studies.soak.contact_running import as_json, soak_contact, table
+from studies.soak.contact_cases import FAMILIES, judge
+from studies.soak.contact_running import family_of, soak_contact, table
 from studies.soak.plain_contact import distance
+from studies.soak.running import as_json
 from tests.support.scripts import run_script
 
 

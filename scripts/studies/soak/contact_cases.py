@@ -4,16 +4,14 @@ from __future__ import annotations
 
 import time
 import zlib
-from collections import Counter
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
-from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import EquilibriumNotFound, NameNotFound
+from softrobots.core.errors import EquilibriumNotFound
 from softrobots.environment.environment import Environment
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 from softrobots.model.loader import load_model
@@ -25,6 +23,7 @@ from softrobots.statics.loads import EARTH_GRAVITY, Load
 from studies.soak.jobs import SECONDS, UNSTABLE, Hang, limited
 from studies.soak.plain_contact import PlainBody, distance, slope
 from studies.soak.plain_statics import Case, PlainStatics, Push
+from studies.soak.verdicts import AnyTally
 
 CHUNK = 100
 """Cases that are drawn together."""
@@ -97,38 +96,19 @@ FAMILIES = (
 
 
 @dataclass
-class Tally:
-    """Outcomes of a family."""
+class Tally(AnyTally):
+    """Outcomes of a family; an outcome is the number of pressed contacts of a certified equilibrium, or a word."""
 
-    cases: int = 0
-    """Number of cases."""
-    outcomes: Counter[str] = field(default_factory=Counter)
-    """Number of cases by outcome: the number of pressed contacts of certified ones, or a word."""
-    residual: float = 0.0
-    """Largest residual over its tolerance, by plain statics."""
     penetration: float = 0.0
     """Deepest penetration by plain distances, relative to the reach."""
     disturbed: int = 0
     """Cases whose energy was compared with that of disturbed springs."""
-    slowest: float = 0.0
-    """Longest time of a case [s]."""
-    seconds: float = 0.0
-    """Total time in the solver [s]."""
-    broken: list[tuple[int, str]] = field(default_factory=list)
-    """Cases that break a law: number and law."""
 
     def add(self, other: Tally) -> None:
         """Add another part of the same family."""
-        self.cases += other.cases
-        self.outcomes.update(other.outcomes)
-        self.residual, self.penetration = max(self.residual, other.residual), max(self.penetration, other.penetration)
+        self._add(other)
+        self.penetration = max(self.penetration, other.penetration)
         self.disturbed += other.disturbed
-        self.slowest, self.seconds = max(self.slowest, other.slowest), self.seconds + other.seconds
-        self.broken += other.broken
-
-    def as_json(self) -> dict[str, Any]:
-        """Return the tally for JSON."""
-        return {**vars(self), "outcomes": dict(sorted(self.outcomes.items()))}
 
 
 def draw(family: Family, body: PlainBody, seed: int, number: int) -> tuple[Case, Environment]:
@@ -267,15 +247,3 @@ def _not_lowest(
         if lower > rounding:
             return [f"a certified minimum, but {lower:.3g} J less at {np.linalg.norm(there - found.q_springs):.2g} from it"]
     return []
-
-
-def family_of(name: str) -> Family:
-    """Return the family of a name.
-
-    Raises:
-        NameNotFound: If there is none.
-    """
-    found = [family for family in FAMILIES if family.name == name]
-    if not found:
-        raise NameNotFound("family", name, [family.name for family in FAMILIES])
-    return found[0]

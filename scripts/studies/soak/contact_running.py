@@ -7,12 +7,17 @@ import multiprocessing
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from concurrent.futures import ProcessPoolExecutor
-from typing import Any
 
 from softrobots.core.checks import positive_integer
 from softrobots.core.progress import with_progress
-from studies.soak.contact_cases import BLOCKED, CHUNK, FAMILIES, NOT_FOUND, Tally, family_of, judge
+from studies.soak.contact_cases import BLOCKED, CHUNK, FAMILIES, NOT_FOUND, Family, Tally, judge
 from studies.soak.jobs import UNSTABLE
+from studies.soak.running import family_among
+
+
+def family_of(name: str) -> Family:
+    """Return the family of a name among `FAMILIES`; errors as of `studies.soak.running.family_among`."""
+    return family_among(FAMILIES, name)
 
 
 def soak_contact(cases: int, *, seed: int = 0, processes: int = 1, progress: bool = False) -> dict[str, Tally]:
@@ -67,13 +72,3 @@ def _row(text: str, tally: Tally) -> str:
     cells += [left.pop(name, 0) for name in (UNSTABLE, BLOCKED, NOT_FOUND)]
     numbers = [f"{tally.residual:.2g}", f"{tally.penetration:.1g}", f"{tally.slowest:.2g}", str(len(tally.broken))]
     return f"| {' | '.join([text, *(f'{n:,}'.replace(',', ' ') for n in (tally.cases, *cells, left.total())), *numbers])} |"
-
-
-def as_json(tallies: Mapping[str, Tally], *, seed: int) -> dict[str, Any]:
-    """Return the tallies for JSON."""
-    return {
-        "seed": seed,
-        "cases": sum(tally.cases for tally in tallies.values()),
-        "broken": sum(len(tally.broken) for tally in tallies.values()),
-        "families": {name: tally.as_json() for name, tally in tallies.items()},
-    }

@@ -7,14 +7,14 @@ import multiprocessing
 from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from dataclasses import replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 from softrobots.core.checks import positive_integer
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.core.progress import with_progress
 from studies.soak.families import FAMILIES, Family, draw_cases
 from studies.soak.jobs import STABLE, UNSTABLE
-from studies.soak.verdicts import Tally, case_text, judge
+from studies.soak.verdicts import AnyTally, Tally, case_text, judge
 
 _AHEAD = 4  # parts queued for each process
 PATIENCE = 1800.0
@@ -32,16 +32,32 @@ class Part(NamedTuple):
     """Number of rows, from the first."""
 
 
-def family_of(name: str) -> Family:
+class Named(Protocol):
+    """What has a name at the command line."""
+
+    @property
+    def name(self) -> str:
+        """The name."""
+
+
+AnyFamily = TypeVar("AnyFamily", bound=Named)
+
+
+def family_among(families: Sequence[AnyFamily], name: str) -> AnyFamily:
     """Return the family of a name.
 
     Raises:
         NameNotFound: If there is none.
     """
-    found = [family for family in FAMILIES if family.name == name]
+    found = [family for family in families if family.name == name]
     if not found:
-        raise NameNotFound("family", name, [family.name for family in FAMILIES])
+        raise NameNotFound("family", name, [family.name for family in families])
     return found[0]
+
+
+def family_of(name: str) -> Family:
+    """Return the family of a name among `FAMILIES`; errors as of `family_among`."""
+    return family_among(FAMILIES, name)
 
 
 def parts_of(cases: int, families: Sequence[Family]) -> list[Part]:
@@ -202,7 +218,7 @@ def _row(text: str, tally: Tally) -> str:
     return f"| {' | '.join(cells)} |"
 
 
-def as_json(tallies: Mapping[str, Tally], *, seed: int) -> dict[str, Any]:
+def as_json(tallies: Mapping[str, AnyTally], *, seed: int) -> dict[str, Any]:
     """Return the tallies for JSON."""
     return {
         "seed": seed,

@@ -34,8 +34,8 @@ MUSCLE_ERROR = 1e-9
 
 
 @dataclass
-class Tally:
-    """Outcomes of a family."""
+class AnyTally:
+    """Outcomes of a family, of any soak."""
 
     cases: int = 0
     """Number of cases."""
@@ -43,10 +43,6 @@ class Tally:
     """Number of cases by outcome."""
     residual: float = 0.0
     """Largest residual over its tolerance, by plain statics."""
-    tangents: int = 0
-    """Number of tangent stiffnesses computed again."""
-    iterations: int = 0
-    """Largest number of iterations."""
     slowest: float = 0.0
     """Longest time of a case [s]; in a batch, the mean."""
     seconds: float = 0.0
@@ -54,13 +50,11 @@ class Tally:
     broken: list[tuple[int, str]] = field(default_factory=list)
     """Cases that break a law: number and law."""
 
-    def add(self, other: Tally) -> None:
-        """Add another part of the same family."""
+    def _add(self, other: AnyTally) -> None:
+        """Add what every soak counts."""
         self.cases += other.cases
         self.outcomes.update(other.outcomes)
         self.residual = max(self.residual, other.residual)
-        self.tangents += other.tangents
-        self.iterations = max(self.iterations, other.iterations)
         self.slowest = max(self.slowest, other.slowest)
         self.seconds += other.seconds
         self.broken += other.broken
@@ -68,6 +62,22 @@ class Tally:
     def as_json(self) -> dict[str, Any]:
         """Return the tally for JSON."""
         return {**vars(self), "outcomes": dict(sorted(self.outcomes.items()))}
+
+
+@dataclass
+class Tally(AnyTally):
+    """Outcomes of a family."""
+
+    tangents: int = 0
+    """Number of tangent stiffnesses computed again."""
+    iterations: int = 0
+    """Largest number of iterations."""
+
+    def add(self, other: Tally) -> None:
+        """Add another part of the same family."""
+        self._add(other)
+        self.tangents += other.tangents
+        self.iterations = max(self.iterations, other.iterations)
 
 
 def judge(family: Family, seed: int, chunk: int, rows: Sequence[int]) -> tuple[Tally, list[Answer]]:

@@ -155,8 +155,8 @@ def _state(
 
 def _with_slips(contacts: tuple[Contact, ...], statuses: list[str], slips: FloatArray) -> tuple[Contact, ...]:
     """Contacts with what is known of the step in which they were found; those that press are in the order of the file."""
-    told = iter(zip(statuses, slips, strict=True))
-    pairs = [(one, next(told, None) if one.strict else None) for one in contacts]
+    of_pressed = iter(zip(statuses, slips, strict=True))
+    pairs = [(one, next(of_pressed, None) if one.strict else None) for one in contacts]
     return tuple(one if known is None else replace(one, status=known[0], slip=known[1].copy()) for one, known in pairs)
 
 
