@@ -152,7 +152,7 @@ def _files(folder: Path, report: _Report) -> None:
     from tqdm import tqdm
 
     rows = report.answer["urdf_files"] = []
-    for name, robot in tqdm(ROBOTS.items(), desc="xacro", unit="file", leave=False):
+    for name, robot in tqdm(ROBOTS.items(), desc="xacro", unit="file", leave=False, disable=None):
         file, generated = folder / f"{name}.urdf", robot().urdf().encode("utf-8")
         rows.append({"file": file, "up_to_date": file.is_file() and file.read_bytes() == generated})
         if not rows[-1]["up_to_date"]:
@@ -167,7 +167,7 @@ def _kinematics(folder: Path, tools: Sequence[str], report: _Report) -> None:
 
     rows: list[KinematicsRow] = []
     pairs = [(folder / f"{name}.urdf", tool) for name in ROBOTS for tool in tools]
-    for path, tool in tqdm(pairs, desc="kinematics", unit="robot", leave=False):
+    for path, tool in tqdm(pairs, desc="kinematics", unit="robot", leave=False, disable=None):
         try:
             rows += compare_kinematics(path, [tool])
         except SoftRobotsError as error:

@@ -49,6 +49,8 @@ def add_parser(subparsers: Any) -> None:
     add_gravity(parser)
     add_environment(parser)
     add_numbers(parser, "--friction", "MU", "coefficient of friction of the obstacles [-] (0)")
+    help_text = "copy mesh files there, converted where the tool does not read them (their own places on this computer)"
+    parser.add_argument("--mesh-folder", type=Path, metavar="FOLDER", help=help_text)
     parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -63,6 +65,7 @@ def run(arguments: argparse.Namespace) -> None:
         "gravity": gravity_of(arguments),
         "environment": environment_of(arguments),
         "friction": arguments.friction,
+        "mesh_folder": arguments.mesh_folder,
     }
     options = {option: value for option, value in chosen.items() if value is not None}
     new_file(arguments.output, overwrite=arguments.overwrite)  # refused before the work

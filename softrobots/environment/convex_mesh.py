@@ -70,7 +70,7 @@ class Mesh(Obstacle):
         if factors.shape not in ((), (3,)):
             raise ParameterError("scale", scale, "one number, or of shape (3,)")
         if isinstance(self.vertices, str | os.PathLike):
-            points, triangles = _read(os.fspath(self.vertices))
+            points, triangles = read_triangles(os.fspath(self.vertices))
         else:
             points, triangles = finite_array("vertices", self.vertices, (None, 3), "m"), None
         points = points * factors
@@ -123,8 +123,12 @@ def hull_of(points: bytes) -> Hull:
     return Hull(corners, triangles, normals, read_only(-whole.equations[:, 3]), edges, outward, np.stack([one, other], axis=1))
 
 
-def _read(name: str) -> tuple[FloatArray, Any]:
-    """Corners and triangles of a file."""
+def read_triangles(name: str) -> tuple[FloatArray, Any]:
+    """Return corners and triangles of a mesh file, shapes (n, 3), in the unit of the file, and (m, 3), integers.
+
+    Raises:
+        FileFormatError: If the file does not exist, is too large or cannot be read.
+    """
     import trimesh
 
     path = find_mesh(name)

@@ -5,5 +5,6 @@ from softrobots.export.mjcf import to_mjcf
 from softrobots.export.sdf import to_sdf
 from softrobots.export.sidecar import to_json
 from softrobots.export.snippets import to_pinocchio, to_pybullet
+from softrobots.export.urdf import to_urdf
 
-__all__ = ["FORMATS", "export_model", "to_json", "to_mjcf", "to_pinocchio", "to_pybullet", "to_sdf"]
+__all__ = ["FORMATS", "export_model", "to_json", "to_mjcf", "to_pinocchio", "to_pybullet", "to_sdf", "to_urdf"]

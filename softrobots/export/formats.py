@@ -10,10 +10,14 @@ from typing import Any, NamedTuple
 
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import as_path, new_file, write_text
+from softrobots.environment.convex_mesh import Mesh
+from softrobots.environment.environment import Environment
+from softrobots.export.meshes import MeshFolder
 from softrobots.export.mjcf import to_mjcf
 from softrobots.export.sdf import to_sdf
 from softrobots.export.sidecar import to_json
 from softrobots.export.snippets import to_pinocchio, to_pybullet
+from softrobots.export.urdf import to_urdf
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import XacroRobot
@@ -38,6 +42,7 @@ class Format(NamedTuple):
 FORMATS: Mapping[str, Format] = {
     "mjcf": Format(".xml", to_mjcf, "MuJoCo"),
     "sdf": Format(".sdf", to_sdf, "Drake and Gazebo"),
+    "urdf": Format(".urdf", to_urdf, "whatever reads URDF, with mesh files; springs are tags there"),
     "pybullet": Format(".py", to_pybullet, "PyBullet, as Python with springs as torques"),
     "pinocchio": Format(".py", to_pinocchio, "Pinocchio, as Python with springs and a solver"),
     "json": Format(".json", to_json, "any other tool, as a table of what URDF readers miss"),
@@ -56,7 +61,8 @@ def export_model(
         format: Name of the format, one of `FORMATS`; by default from the suffix of the file, if only one format has it.
         overwrite: Whether a file that exists may be replaced.
         options: For the exporter: `q_motors`, `actuators`, `damping`, `gravity`, `limits`, `environment`, `friction`,
-            `mesh_folder`, `robot`; see `to_mjcf` ...
+            `mesh_folder`, `robot`; see `to_mjcf` ... Meshes copied to `mesh_folder` are named relative to the file, so that
+            both can be moved together.
 
     Returns:
         The path.
@@ -81,9 +87,17 @@ def export_model(
     model = source if isinstance(source, SoftModel) else load_model(source)
     if "robot" in chosen.options and isinstance(source, XacroRobot):
         options = {"robot": source} | options
-    if "mesh_folder" in chosen.options:
-        options = {"mesh_folder": Path(path).absolute().parent} | options
+    beside = Path(path).absolute().parent
+    if options.get("mesh_folder") is not None:
+        place = as_path("mesh_folder", options["mesh_folder"]).absolute()
+        options |= {"mesh_folder": MeshFolder(place, Path(os.path.relpath(place, beside)))}
+    elif chosen.write is to_sdf and any(isinstance(obstacle, Mesh) for obstacle in _obstacles(options.get("environment"))):
+        options |= {"mesh_folder": beside}
     return write_text(path, chosen.write(model, **options), overwrite=overwrite)
+
+
+def _obstacles(environment: Any) -> tuple[Any, ...]:
+    return tuple(environment) if isinstance(environment, Environment) else ()  # the exporter refuses anything else
 
 
 def guess_format(path: str | os.PathLike[str]) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Sequence
 from pathlib import Path
@@ -13,7 +14,7 @@ from softrobots.core.errors import DescriptionError
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.environment.environment import Environment
-from softrobots.export.meshes import MeshFiles, mujoco_reads
+from softrobots.export.meshes import MeshFiles, MeshFolder, mujoco_reads
 from softrobots.export.mjcf_contact import (
     SOFTNESS,
     capsule_bits,
@@ -46,12 +47,13 @@ def to_mjcf(
     limits: bool = True,
     environment: Environment | None = None,
     friction: float = 0.0,
+    mesh_folder: str | os.PathLike[str] | None = None,
 ) -> str:
     """Write a robot as MJCF that MuJoCo 3 and 4 read.
 
     Bodies and joints keep their names of the URDF; fixed links stay bodies; a site marks the tip; numbers have all digits.
     Springs are `stiffness` and `springref`. Neighbours along the chain do not collide (`prepared.neighbours`). Meshes in STL
-    and OBJ are named by their whole path, others are left out.
+    and OBJ are named by absolute path, others are left out; with `mesh_folder` they are copied there, others as OBJ.
 
     Driven motors are position actuators (`softrobots.export.servos`), whose joints have the damping at which the motor just
     reaches its largest speed under its largest torque, if `damping` is "critical". Actuators along the body are spatial tendons
@@ -73,6 +75,7 @@ def to_mjcf(
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
         environment: Obstacles around the robot, which stand still.
         friction: Coefficient of friction between the robot and them.
+        mesh_folder: Folder for copies of mesh files, named by their content; None: the originals are used.
 
     Returns:
         MJCF text.
@@ -83,6 +86,7 @@ def to_mjcf(
             routes. If obstacles move, or friction is given without any.
         DescriptionError: If the robot has moving links without mass or moments of inertia, a link with impossible
             moments, a link `world` that is not its root, or more joints than Pinocchio supports.
+        OutputError: If the copy of a mesh cannot be written.
     """
     field = checked_gravity(gravity)
     robot = prepare(
@@ -100,7 +104,7 @@ def to_mjcf(
         write_contact_defaults(root, option, robot.contact.friction)
     assets = ElementTree.SubElement(root, "asset")
     sites = place_sites(tendons)
-    bodies = _Bodies(robot, limits, damping == "critical", assets, sites)
+    bodies = _Bodies(robot, limits, damping == "critical", assets, sites, MeshFiles(MeshFolder.of(mesh_folder)))
     world = ElementTree.SubElement(root, "worldbody")
     bodies.write(world)
     if robot.contact is not None:
@@ -129,13 +133,19 @@ class _Bodies:
     """Writes the nested bodies; records the order of the joints and the meshes left out."""
 
     def __init__(
-        self, robot: PreparedRobot, limits: bool, limit_speed: bool, assets: ElementTree.Element, sites: Sites
+        self,
+        robot: PreparedRobot,
+        limits: bool,
+        limit_speed: bool,
+        assets: ElementTree.Element,
+        sites: Sites,
+        meshes: MeshFiles,
     ) -> None:
         self._robot, self._limits, self._assets, self._sites = robot, limits, assets, sites
         self._damping = {motor.joint.name: motor.speed_damping for motor in robot.motors} if limit_speed else {}
         self._mesh_names: dict[tuple[Path, tuple[float, ...]], str] = {}
         self.order: list[str] = []
-        self.meshes = MeshFiles()
+        self.meshes = meshes
 
     def write(self, world: ElementTree.Element) -> None:
         """Write the whole tree; a root named world is MuJoCo's world."""

@@ -15,7 +15,7 @@ from softrobots.core.checks import LARGEST
 from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.environment.environment import Environment
-from softrobots.export.meshes import MeshFiles, drake_collides, drawn_anywhere
+from softrobots.export.meshes import MeshFiles, MeshFolder, drake_collides, drawn_anywhere
 from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
 from softrobots.export.sdf_contact import HARDNESS, write_hardness, write_obstacles
 from softrobots.export.sdf_parts import DRAKE, WORLD, write_colour, write_geometry, write_number, write_pose
@@ -41,8 +41,9 @@ def to_sdf(
 
     Links and joints keep their names of the URDF, fixed joints stay, the base is fixed to the world; rotations are
     quaternions, numbers have all digits. Springs are `spring_stiffness` and `spring_reference`. A moving link without
-    mass becomes a frame, because SDF has no such links; its shapes are moved to a link that it is fixed to. Meshes are given by
-    absolute path; collision meshes are left out unless Drake reads them.
+    mass becomes a frame, because SDF has no such links; its shapes are moved to a link that it is fixed to. Meshes are named by
+    absolute path, and collision meshes are left out unless Drake reads them; with `mesh_folder` they are copied there, and
+    those that Drake does not read are converted to OBJ.
 
     Driven motor joints are free joints with their torque limits: SDF has no actuators, the user adds a controller, and Drake
     creates an actuator for each. Spring joints have effort 0, so that Drake creates none for them. SDF has no muscles: use
@@ -65,8 +66,8 @@ def to_sdf(
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
         environment: Obstacles around the robot, which stand still.
         friction: Coefficient of friction between the robot and them.
-        mesh_folder: Folder for OBJ files of obstacles that are meshes, named by their content; `export_model` takes that of the
-            SDF file.
+        mesh_folder: Folder for copies of mesh files, named by their content. Obstacles that are meshes need one; for them
+            `export_model` takes that of the SDF file.
 
     Returns:
         SDF text.
@@ -79,6 +80,7 @@ def to_sdf(
             reserves, or more joints than Pinocchio supports.
         OutputError: If the file of a mesh cannot be written.
     """
+    folder = MeshFolder.of(mesh_folder)
     robot = prepare(model, q_motors, actuators=actuators, damping=damping, environment=environment, friction=friction)
     if model.muscles and actuators == "driven":
         raise ParameterError("actuators", actuators, '"welded" for a robot with muscles or tendons, which SDF does not have')
@@ -98,8 +100,8 @@ def to_sdf(
     name, parent = tree.name or "robot", root
     if robot.contact is not None:
         parent = ElementTree.SubElement(root, "world", {"name": f"{name}_with_surroundings"})
-        write_obstacles(parent, robot.contact, mesh_folder)
-    writer = _Model(ElementTree.SubElement(parent, "model", {"name": name}), robot, limits)
+        write_obstacles(parent, robot.contact, folder)
+    writer = _Model(ElementTree.SubElement(parent, "model", {"name": name}), robot, limits, MeshFiles(folder))
     writer.write()
     return document(root, _head(robot, writer.meshes, limits))
 
@@ -107,12 +109,12 @@ def to_sdf(
 class _Model:
     """Writes links, frames and joints into a model, and records the meshes left out."""
 
-    def __init__(self, element: ElementTree.Element, robot: PreparedRobot, limits: bool) -> None:
+    def __init__(self, element: ElementTree.Element, robot: PreparedRobot, limits: bool, meshes: MeshFiles) -> None:
         self._element, self._robot, self._limits = element, robot, limits
         self._anchor = _anchors(robot.tree)
         self._names = {body.name for body in robot.tree.bodies} | {joint.name for joint in robot.tree.joints}
         self._world_shapes = self._free_name(_WORLD_SHAPES)
-        self.meshes = MeshFiles()
+        self.meshes = meshes
 
     def _free_name(self, wanted: str) -> str:
         while wanted in self._names:

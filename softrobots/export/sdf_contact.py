@@ -7,16 +7,13 @@ softer at large time steps. A pair of shapes has one contact. Gazebo does not re
 
 from __future__ import annotations
 
-import hashlib
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Any
 
 from softrobots.core.errors import ParameterError
-from softrobots.core.files import as_path, write_text
-from softrobots.description.rigid_tree import number_text
 from softrobots.environment.convex_mesh import Mesh
 from softrobots.export.contact_shapes import ContactShapes
+from softrobots.export.meshes import MeshFolder, obj_of
 from softrobots.export.sdf_parts import DRAKE, write_colour, write_geometry, write_number, write_pose
 
 STIFFNESS = 1e8
@@ -31,7 +28,7 @@ HARDNESS = f"Contact in Drake is a spring of {0.5 * STIFFNESS:g} N/m, with the d
 """How stiff contact is, for the head of the file."""
 
 
-def write_obstacles(world: ElementTree.Element, contact: ContactShapes, mesh_folder: Any) -> None:
+def write_obstacles(world: ElementTree.Element, contact: ContactShapes, mesh_folder: MeshFolder | None) -> None:
     """Write a static model of the obstacles, a link for each, and files of meshes into a folder.
 
     Raises:
@@ -53,14 +50,11 @@ def write_obstacles(world: ElementTree.Element, contact: ContactShapes, mesh_fol
                 write_hardness(element, contact.friction)
 
 
-def _mesh_file(mesh: Mesh, name: str, folder: Any) -> Path:
-    """Write a mesh as OBJ, named by its content, unless it is there already; return the file."""
+def _mesh_file(mesh: Mesh, name: str, folder: MeshFolder | None) -> Path:
+    """Write a mesh as OBJ, and return how SDF names the file."""
     if folder is None:
         raise ParameterError("mesh_folder", folder, f"a folder for the file of {name}: SDF has no meshes without files")
-    lines = [f"v {number_text(corner)}" for corner in mesh.vertices]
-    text = "\n".join([*lines, *(f"f {a} {b} {c}" for a, b, c in (mesh.triangles + 1).tolist())]) + "\n"
-    path = as_path("mesh_folder", folder).absolute() / f"mesh_{hashlib.sha256(text.encode()).hexdigest()[:16]}.obj"
-    return path if path.is_file() else write_text(path, text, overwrite=False)
+    return folder.keep("mesh", ".obj", obj_of(mesh.vertices, mesh.triangles))
 
 
 def write_hardness(collision: ElementTree.Element, friction: float) -> None:

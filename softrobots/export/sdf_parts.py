@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
+from urllib.parse import quote
 
 import numpy as np
 
@@ -20,7 +21,7 @@ def write_geometry(element: ElementTree.Element, shape: Shape, file: Path | None
     """Write a shape; `file` is that of a mesh, which Drake shall take for convex or not."""
     geometry = ElementTree.SubElement(ElementTree.SubElement(element, "geometry"), shape.kind)
     if file is not None:
-        ElementTree.SubElement(geometry, "uri").text = file.as_uri()
+        ElementTree.SubElement(geometry, "uri").text = file.as_uri() if file.is_absolute() else quote(file.as_posix())
         ElementTree.SubElement(geometry, "scale").text = number_text(shape.size)
         if convex:
             ElementTree.SubElement(geometry, f"{{{DRAKE}}}declare_convex")
