@@ -467,10 +467,10 @@ def test_export_answers_machines(told, tmp_path: Path) -> None:
 @each_row(
     ("words", "message"),
     [
-        (["inflatable_arm", "--motors", "1", "2"], "--motors must be 3 numbers: motor_1 [rad], motor_2 [rad], motor_3 [rad]"),
-        (["pcc_arm", "--motors", "1"], "--motors must be 6 numbers: muscle_1_1 [m], "),
-        (["helix_tube", "--motors", "1"], "--motors must be left out: the robot has no motors"),
-        (["inflatable_arm", "--motors", "0", "0", "nan"], "--motors must be an array of shape (3,) of finite numbers [rad]"),
+        (["inflatable_arm", "--motors", "1", "2"], "(it has shape (2,)): motor_1 [rad] (-3.142 to 3.142), motor_2 [rad] "),
+        (["pcc_arm", "--motors", "1"], "(it has shape (1,)): muscle_1_1 [m] (0.4454 to 0.6026), "),
+        (["helix_tube", "--motors", "1"], "(it has shape (1,)): the robot has no actuators"),
+        (["inflatable_arm", "--motors", "0", "0", "nan"], "finite numbers (entry 2, motor_3 [rad] (-3.142 to 3.142), is nan)"),
         (["inflatable_arm", "--spring", "motor_1=3", "--spring", "motor_1=4"], "--spring must be given once for each joint"),
         (["a" * 5000], "no robot or file is called"),
     ],

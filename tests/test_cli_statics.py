@@ -687,10 +687,10 @@ TARGET = ("inflatable_arm", "--target", "0.9", "0.3", "0.2")
 REFUSED = [
     (("solve",), "the following arguments are required: ROBOT"),
     (("solve", "nobody"), "no robot or file is called 'nobody'"),
-    (("solve", "inflatable_arm", "--motors", "1"), "--motors must be 3 numbers: motor_1 [rad], motor_2 [rad], motor_3 [rad]"),
+    (("solve", "inflatable_arm", "--motors", "1"), "(it has shape (1,)): motor_1 [rad] (-3.142 to 3.142), motor_2 "),
     (("solve", "inflatable_arm", "--motors", "1", "2", "inf"), "--motors must be an array of shape (3,) of finite numbers"),
-    (("solve", "inflatable_arm", "--motors", "1", "2", "x"), "invalid float value: 'x'"),
-    (("solve", "helix_tube", "--motors", "1"), "--motors must be left out: the robot has no motors"),
+    (("solve", "inflatable_arm", "--motors", "1", "2", "x"), "'x': a number or NAME=NUMBER is required"),
+    (("solve", "helix_tube", "--motors", "1"), "(it has shape (1,)): the robot has no actuators"),
     (("solve", "inflatable_arm", "--force", "1", "2"), "expected 3 arguments"),
     (("solve", "inflatable_arm", "--force", "1", "2", "nan"), "force must be an array of shape (3,) of finite numbers [N]"),
     (("solve", "inflatable_arm", "--moment", "1", "2", "1e40"), "at most 1e+30 in size"),
@@ -731,7 +731,7 @@ REFUSED = [
     (("load", "pcc_arm", "--muscles", "forces", "--torques", "1"), "a robot with muscles of given length"),
     (("ik", "inflatable_arm"), "one of the arguments --target --waypoints is required"),
     (("ik", *TARGET, "--waypoints", CSV), "not allowed with argument --target"),
-    (("ik", *TARGET, "--start", "1"), "--start must be 3 numbers"),
+    (("ik", *TARGET, "--start", "1"), "(it has shape (1,)): motor_1 [rad]"),
     (("ik", *TARGET, "--start", "9", "0", "0"), "within the motor limits"),
     (("ik", *TARGET, "--elbow", "left"), "invalid choice: 'left'"),
     (

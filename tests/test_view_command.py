@@ -336,7 +336,7 @@ def test_the_browser_of_the_machine_is_opened_on_demand(monkeypatch: pytest.Monk
 BAD = {
     "view": "ROBOT = '(nothing)'",
     "view nobody": "no robot or file is called 'nobody'",
-    "view inflatable_arm --motors 1 2": "3 numbers: motor_1 [rad]",
+    "view inflatable_arm --motors 1 2": "(it has shape (2,)): motor_1 [rad]",
     "view inflatable_arm --result x.npz": "--result must be given without ROBOT",
     "view --result x.npz --gravity --target 1 2 3": "without --target, a load",
     "view --result nowhere.npz": "cannot read a result",

@@ -11,7 +11,7 @@ import pinocchio as pin
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
-from softrobots.cli.options.robot_argument import add_model, motors_of, statics_model_of
+from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.reports.ik_report import solution_answer, solution_lines, trajectory_answer, trajectory_lines
 from softrobots.core.checks import finite_array
@@ -61,8 +61,9 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(how, "--rpy", "R P Y", "orientation of the tip at --target, roll, pitch and yaw as in URDF [rad] (any)")
     add_loads(parser)
     add_environment(parser)
-    help_text = "where the search starts: motor joints, then muscles, base to tip [rad, m, N or Pa] (relaxed)"
-    add_numbers(parser, "--start", "Q", help_text, nargs="+")
+    help_text = "where the search starts: motor joints, then muscles, base to tip, or each as NAME=Q [rad, m, N or Pa] "
+    help_text += "(relaxed)"
+    add_motors(parser, help_text, "--start")
     help_text = (
         "side of the last motor joint, without a wrist, above or below the line from the first one to the tip; of a path at "
         "its start (either)"

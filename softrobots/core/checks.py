@@ -24,14 +24,14 @@ _NOT_NUMBERS = (bool, np.bool_, str, bytes, np.datetime64, np.timedelta64)  # al
 _SHORT = 1000  # size up to which an array is checked as a list
 
 
-def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, unit: str = "") -> FloatArray:
+def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, unit: str | Sequence[str] = "") -> FloatArray:
     """Return `value` as a new float array of the given shape.
 
     Args:
         name: Name of the parameter, for the error.
         value: Anything that NumPy can convert to numbers.
         shape: Required shape, in which None stands for any length; None alone for any shape.
-        unit: Unit for the error, e.g. "N".
+        unit: Unit for the error, e.g. "N", or what each entry of the last axis is, e.g. "motor_1 [rad]".
 
     Returns:
         A copy, float64.
@@ -48,18 +48,19 @@ def finite_array(name: str, value: Any, shape: tuple[int | None, ...] | None, un
     if array is None:  # text, booleans, complex numbers, objects, masked elements
         raise ParameterError(name, value, _array_text(shape, unit))
     if shape is not None and array.shape != shape and not _fits(array.shape, shape):
-        raise ParameterError(name, value, f"{_array_text(shape, unit)} (it has shape {array.shape})")
+        raise ParameterError(name, value, _array_text(shape, unit, f" (it has shape {array.shape})"))
     if array.size > _SHORT:
         accepted = np.abs(array).max() <= LARGEST  # False for NaN too; a list would take five times the memory
     else:  # on a short list the comparison is several times faster than NumPy's reductions
         accepted = all(-LARGEST <= number <= LARGEST for number in array.ravel().tolist())
     if not accepted:
-        requirement = _array_text(shape, unit) + _too_large(bool(np.all(np.isfinite(array))))
-        refuse_where(name, value, ~(np.abs(array) <= LARGEST), requirement)
+        entries = () if isinstance(unit, str) else unit
+        requirement = _array_text(shape, "" if entries else unit, _too_large(bool(np.all(np.isfinite(array)))))
+        refuse_where(name, value, ~(np.abs(array) <= LARGEST), requirement, entries=entries)
     return array
 
 
-def refuse_where(name: str, value: Any, bad: Any, requirement: str, *others: Any) -> None:
+def refuse_where(name: str, value: Any, bad: Any, requirement: str, *others: Any, entries: Sequence[str] = ()) -> None:
     """Raise ParameterError if a condition holds anywhere; for an array the error names the first such place.
 
     Args:
@@ -68,14 +69,16 @@ def refuse_where(name: str, value: Any, bad: Any, requirement: str, *others: Any
         bad: Truth values, of a shape to which `value` and `others` broadcast.
         requirement: What it must be, in which `{}` stands for the entries of `others` at that place.
         others: Numbers that the requirement depends on.
+        entries: What each entry of the last axis is.
     """
     if not np.any(bad):
         return
     places = np.asarray(bad)
     place = tuple(map(int, np.unravel_index(int(np.argmax(places)), places.shape)))
     entry, *limits = (float(np.broadcast_to(numbers, places.shape)[place]) for numbers in (value, *others))
-    where = f" (entry {place if len(place) > 1 else place[0]} is {entry:.6g})" if place else ""
-    raise ParameterError(name, value, requirement.format(*limits) + where)
+    named = f", {entries[place[-1]]}," if entries else ""
+    where = f" (entry {place if len(place) > 1 else place[0]}{named} is {entry:.6g})" if place else ""
+    raise ParameterError(name, value, (requirement.format(*limits) if limits else requirement) + where)
 
 
 def positive_array(name: str, value: Any, unit: str) -> FloatArray:
@@ -205,12 +208,14 @@ def _fits(shape: tuple[int, ...], required: tuple[int | None, ...]) -> bool:
     return len(shape) == len(required) and all(n is None or n == m for n, m in zip(required, shape, strict=True))
 
 
-def _array_text(shape: tuple[int | None, ...] | None, unit: str) -> str:
+def _array_text(shape: tuple[int | None, ...] | None, unit: str | Sequence[str], detail: str = "") -> str:
     shape_text = ""
     if shape is not None:
         inside = ", ".join("n" if n is None else str(n) for n in shape)
         shape_text = f"shape ({inside}{',' if len(shape) == 1 else ''}) of "
-    return f"an array of {shape_text}finite numbers" + _unit_text(unit)
+    if isinstance(unit, str):
+        return f"an array of {shape_text}finite numbers" + _unit_text(unit) + detail
+    return f"an array of {shape_text}finite numbers{detail}" + (f": {', '.join(unit)}" if unit else "")
 
 
 def _unit_text(unit: str) -> str:

@@ -14,7 +14,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, non_negative_number, one_each
 from softrobots.core.errors import LoadNotFound, ParameterError
-from softrobots.dynamics.time_inputs import checked_function, waypoint_curve
+from softrobots.dynamics.time_inputs import checked_function, motor_function, waypoint_curve
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_jacobian
@@ -57,7 +57,12 @@ class PD:
         if count == 0:
             raise ParameterError("model", model, "a robot with at least one motor joint")
         self._kp, self._kd = one_each("kp", kp, count, "N m/rad"), one_each("kd", kd, count, "N m s/rad")
-        self._reference = _time_function(model, "reference", reference, (model.n_motors, "rad"), lambda one: one.q_motors)
+        if callable(reference):
+            reference = motor_function("reference", reference, model)
+        else:
+            reference = model.actuators.in_order(reference, "reference")
+        kind = (model.n_motors, model.actuators.described)
+        self._reference = _time_function(model, "reference", reference, kind, lambda one: one.q_motors)
         added = np.zeros(count) if feed_forward is None else feed_forward
         self._feed_forward = _time_function(model, "feed_forward", added, (count, "N m"), _exerted_torques)
         self._desired = lru_cache(maxsize=1)(self._desired_at)  # a step of time asks for many states at one time
@@ -183,7 +188,7 @@ class ClosedLoop:
 
 
 def _time_function(
-    model: SoftModel, name: str, value: Any, kind: tuple[int, str], values_of: Callable[[Trajectory], FloatArray]
+    model: SoftModel, name: str, value: Any, kind: tuple[int, Any], values_of: Callable[[Trajectory], FloatArray]
 ) -> Callable[[float], FloatArray]:
     """A constant, a trajectory or a function as a function of time; `kind` is the number of values and their unit."""
     count, unit = kind

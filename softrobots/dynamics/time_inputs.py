@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any
 
@@ -42,7 +42,7 @@ class MotorPath:
             self._signal = waypoint_curve("q_motors", q_motors, model, q_motors.q_motors)
             self.breaks = q_motors.times[-1:] - q_motors.times[0]
         elif callable(q_motors):
-            self._signal = checked_function("q_motors", q_motors, (model.n_motors,), "rad")
+            self._signal = motor_function("q_motors", q_motors, model)
             for time in np.linspace(0.0, duration, 21).tolist():
                 model.checked_motors(self._signal(time), f"q_motors(t={time:.6g})")
             self._find_kicks(model, duration)
@@ -153,7 +153,7 @@ class TimeLoad:
         wrenches[frame] = total
 
 
-def checked_function(name: str, function: Callable[[float], Any], shape: tuple[int, ...], unit: str) -> Signal:
+def checked_function(name: str, function: Callable[[float], Any], shape: tuple[int, ...], unit: str | Sequence[str]) -> Signal:
     """Return a function of time whose values are checked; an error names the time.
 
     Raises:
@@ -165,6 +165,12 @@ def checked_function(name: str, function: Callable[[float], Any], shape: tuple[i
 
     checked(0.0)
     return checked
+
+
+def motor_function(name: str, function: Callable[[float], Any], model: SoftModel) -> Signal:
+    """Return such a function for positions of the actuators, in order or by name."""
+    actuators = model.actuators
+    return checked_function(name, lambda time: actuators.in_order(function(time), name), (model.n_motors,), actuators.described)
 
 
 def find_jumps(signal: Signal, duration: float, *, resolution: float = 0.0, least: float = 0.0) -> FloatArray:

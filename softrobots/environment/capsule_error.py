@@ -44,12 +44,13 @@ def capsule_error(model: SoftModel, q_motors: Any, q_springs: Any | None = None)
         ParameterError: If `model` is not a `SoftModel`, a shape differs, a number is not finite, or a section is bent or
             twisted beyond its range.
     """
-    check_model(model).configuration(q_motors, q_springs)  # refuses bad coordinates
+    motors = check_model(model).checked_motors(q_motors)
+    model.configuration(motors, q_springs)  # refuses bad coordinates
     rows = model.structure.section_table
     if not rows:
         return np.zeros(0)
     elastic = model.rest if q_springs is None else np.asarray(q_springs, dtype=np.float64)
-    z = model.structure.section_coordinates(np.asarray(q_motors, dtype=np.float64), elastic)
+    z = model.structure.section_coordinates(motors, elastic)
     rest, lengths = np.array([row.rest for row in rows]), np.array([row.length for row in rows])
     radius = np.array([row.radius for row in rows])
     if model.structure.constant_strain:

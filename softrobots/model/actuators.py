@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
-from softrobots.core.errors import ParameterError
+from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.actuator_laws import (
     UNFELT,
@@ -107,15 +108,65 @@ class Actuators:
         kinds = [muscle.kind for muscle in muscles]
         self.feels = np.array([*(True for _ in joints), *(kind not in UNFELT for kind in kinds)], dtype=bool)
         """Which of them feel a load on the robot: all but given tensions and pressures, shape (n_motors,), truth values."""
-        self._unit = ", ".join(dict.fromkeys(self.units[len(joints) :])) or "rad"
+
+    @cached_property
+    def described(self) -> tuple[str, ...]:
+        """Name, unit and limits of each, as errors tell them, e.g. "motor_1 [rad] (-3.14 to 3.14)"."""
+        limits = ["" if np.isinf(pair).all() else " ({:.4g} to {:.4g})".format(*pair) for pair in self.limits]
+        rows = zip(self.names, self.units, limits, strict=True)
+        return tuple(f"{name} [{unit}]{pair}" for name, unit, pair in rows) or ("the robot has no actuators",)
+
+    @cached_property
+    def described_loads(self) -> tuple[str, ...]:
+        """Name of each and the unit of its load, e.g. "motor_1 [N m]"."""
+        rows = zip(self.names, load_units(self.units), strict=True)
+        return tuple(f"{name} [{unit}]" for name, unit in rows) or ("the robot has no actuators",)
+
+    def in_order(self, values: Any, field: str) -> Any:
+        """Return values by name of actuator in the order of the actuators; anything else as it came.
+
+        Args:
+            values: Number of each actuator by its name, or its numbers in many cases: a mapping, or a row or a table of pandas.
+            field: Name of the parameter, for errors.
+
+        Raises:
+            NameNotFound: If there is no actuator of a name.
+            ParameterError: If an actuator is missing; the errors list the actuators in order, with units and limits.
+        """
+        names = list(values.keys()) if callable(getattr(values, "keys", None)) else None
+        if names is None or (hasattr(values, "__array__") and not any(isinstance(name, str) for name in names)):
+            return values
+        for name in names:
+            if name not in self.names:
+                raise NameNotFound("actuator", name, self.names, lines=self.described)
+        missing = [name for name in self.names if name not in names]
+        if missing:
+            text = f"a number for each actuator; {', '.join(missing)} missing, of {', '.join(self.described)}"
+            raise ParameterError(field, values, text)
+        if not names:
+            return np.zeros(0)
+        try:
+            return np.stack(np.broadcast_arrays(*(values[name] for name in self.names)), axis=-1)
+        except ValueError as error:
+            raise ParameterError(field, values, "a number for each actuator, or as many for one as for another") from error
 
     def checked(self, value: Any, field: str) -> FloatArray:
         """Return positions that the robot can have, as a new array; see `SoftModel.checked_motors`."""
-        motors = finite_array(field, value, (len(self.names),), self._unit)
+        given = value if type(value) is np.ndarray else self.in_order(value, field)
+        motors = finite_array(field, given, (len(self.names),), self.described)
         requirement = self._refusal(motors)
         if requirement is not None:
             raise ParameterError(field, motors, requirement)
         return motors
+
+    def checked_loads(self, value: Any, field: str) -> FloatArray:
+        """Return loads of the actuators, given in order or by name, as a new array, shape (n_motors,) [N m or N].
+
+        Raises:
+            ParameterError: If the shape differs, a name is missing, or a number is not finite; lists the actuators.
+            NameNotFound: If there is no actuator of a name.
+        """
+        return finite_array(field, self.in_order(value, field), (len(self.names),), self.described_loads)
 
     def _refusal(self, motors: FloatArray) -> str | None:
         if self._lengths is not None:

@@ -42,10 +42,16 @@ def read_chain(
     shape (n_motors, 2) [rad, m, N or Pa], and reach [m] are copied; `groups` are the springs of the inflated links.
 
     Raises:
-        DescriptionError: If a joint is not on the way from base to tip or neither turns nor slides, the springs of a slack
-            wall are not two that turn, one behind the other, an actuator winds along lumped sections, or given lengths
-            depend on each other otherwise than those of muscles that run straight along a whole segment.
+        DescriptionError: If an inflated link has a plateau, a joint is not on the way from base to tip or neither turns nor
+            slides, the springs of a slack wall are not two that turn, one behind the other, an actuator winds along lumped
+            sections, or given lengths depend on each other otherwise than those of muscles that run straight along a whole
+            segment.
     """
+    if any(group.max_moment is not None for group in groups):
+        raise DescriptionError(
+            f"an inflated link of {pinocchio_model.name} has max_moment; compiled solvers need springs that are linear, or "
+            "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
+        )
     _check_actuators(str(pinocchio_model.name), structure)
     tip = pinocchio_model.frames[tip_frame]
     elements, axes = _elements(pinocchio_model, _path(pinocchio_model, tip.parentJoint, str(tip.name)), structure)

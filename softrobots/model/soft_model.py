@@ -13,7 +13,7 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
-from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
+from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.actuator_laws import ROUNDING
 from softrobots.model.actuators import Actuators
@@ -29,7 +29,8 @@ from softrobots.model.structure import Structure
 class SoftModel:
     """A robot with actuators (prescribed) and elastic coordinates (free), ready for statics.
 
-    Actuators are motor joints, then muscles; `q_motors` everywhere holds joint coordinates, then the inputs of muscles.
+    Actuators are motor joints, then muscles; `q_motors` everywhere holds joint coordinates, then the inputs of muscles, or is
+    a mapping of them by name.
     Elastic coordinates, `q_springs`, are joint springs and the free coordinates of the sections of constant strain.
 
     Returned by `softrobots.load_model`. Arrays are ordered base to tip. A model is immutable; do not change `pinocchio` either.
@@ -87,6 +88,16 @@ class SoftModel:
     def motor_joints(self) -> tuple[str, ...]:
         """Names of the actuators: motor joints, then muscles."""
         return self.actuators.names
+
+    @property
+    def actuator_names(self) -> tuple[str, ...]:
+        """Names of the actuators in the order of `q_motors`; the same as `motor_joints`."""
+        return self.actuators.names
+
+    @property
+    def actuator_units(self) -> tuple[str, ...]:
+        """Unit of each of them: "rad", "m", "N" or "Pa"."""
+        return self.actuators.units
 
     @property
     def muscles(self) -> tuple[ActuatorTag, ...]:
@@ -197,11 +208,13 @@ class SoftModel:
         """Return actuator coordinates that the robot can have, as a new array.
 
         Args:
-            q_motors: Actuator coordinates, shape (n_motors,) [rad, m, N or Pa].
+            q_motors: Actuator coordinates, shape (n_motors,) [rad, m, N or Pa], or by name, `{"motor_1": 0.3, ...}`.
             field: Name of the parameter, for the error.
 
         Raises:
-            ParameterError: If the shape differs, a number is not finite, or the robot cannot have such muscle lengths.
+            ParameterError: If the shape differs, a name is missing, a number is not finite, or the robot cannot have such
+                muscle lengths. This error and the next list the actuators with units and limits.
+            NameNotFound: If there is no actuator of a name.
         """
         return self.actuators.checked(q_motors, field)
 
@@ -275,11 +288,6 @@ class SoftModel:
 
     @cached_property
     def _chain(self) -> SerialChain:
-        if any(group.max_moment is not None for group in self.spring_groups):
-            raise DescriptionError(
-                f"an inflated link of {self.pinocchio.name} has max_moment; compiled solvers need springs that are linear, or "
-                "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
-            )
         tip = self.frame_id(self.tip)
         return read_chain(
             self.pinocchio, self.structure, tip, limits=self.motor_limits, reach=self.reach, groups=self.spring_groups

@@ -46,7 +46,8 @@ def solve_equilibrium(
 
     Args:
         model: The robot.
-        q_motors: Motor coordinates, shape (n_motors,) [rad or m].
+        q_motors: Actuator coordinates, shape (n_motors,) [rad, m, N or Pa], in the order of `model.actuator_names`; or by name,
+            `{"motor_1": 0.3, ...}`, here and wherever a function takes `q_motors`.
         force: Force at `frame`, shape (3,) [N], world axes.
         wrench: Wrench at `frame`, shape (6,) [N, N m], world axes, force first; or `{frame: (6,)}` for several.
         frame: Name of the frame of `force` and `wrench`; the tip by default.

@@ -201,7 +201,7 @@ def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
         return np.array(model.relaxed_motors)
     motors = model.checked_motors(q_motors0, "q_motors0")
     if np.any((motors < low) | (motors > high)):
-        raise ParameterError("q_motors0", q_motors0, f"within the motor limits {model.motor_limits.tolist()}")
+        raise ParameterError("q_motors0", q_motors0, f"within the motor limits: {', '.join(model.actuators.described)}")
     return motors
 
 

@@ -152,7 +152,7 @@ def estimate_load(
     instance_of("restart", restart, bool, "True or False")
     check_feels(model)
     motors = model.checked_motors(q_motors)
-    torques = finite_array("motor_torques", motor_torques, (model.n_motors,), "N m")
+    torques = model.actuators.checked_loads(motor_torques, "motor_torques")
     errors = MeasurementErrors.of(model, torque_std, stiffness_std, motor_angle_std)
     at = model.tip if frame is None else frame
     span = _span(directions)

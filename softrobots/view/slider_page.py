@@ -202,7 +202,7 @@ class SliderPage(ServedPage):
         motors = self._model.checked_motors(value)
         low, high = self._model.motor_limits.T
         if not np.all((motors >= low) & (motors <= high)):
-            raise ParameterError("q_motors", value, f"within the limits of the motors, {self._model.motor_limits.tolist()}")
+            raise ParameterError("q_motors", value, f"within the limits: {', '.join(self._model.actuators.described)}")
         return tuple(motors.tolist())
 
     def _checked_force(self, force: FloatArray) -> tuple[float, ...]:

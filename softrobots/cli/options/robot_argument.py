@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.options.command_line import add_numbers, refuse_too_large
+from softrobots.cli.options.command_line import refuse_too_large
 from softrobots.cli.options.robot_parameters import check_names, make_robot, parse_parameters, xacro_parameters
 from softrobots.cli.tools.kinematics import is_urdf_file
 from softrobots.core.checks import FloatArray
@@ -58,10 +58,21 @@ def add_model(parser: argparse.ArgumentParser, *, optional: bool = False, option
 
 
 def add_motors(
-    parser: argparse.ArgumentParser, help_text: str = "motor joints, then muscles, base to tip [rad, m, N or Pa] (relaxed)"
+    parser: argparse._ActionsContainer,
+    help_text: str = "motor joints, then muscles, base to tip, or each as NAME=Q [rad, m, N or Pa] (relaxed)",
+    option: str = "--motors",
 ) -> None:
-    """Add `--motors`; see `motors_of`."""
-    add_numbers(parser, "--motors", "Q", help_text, nargs="+")
+    """Add `--motors`, or an option like it; see `motors_of`."""
+    parser.add_argument(option, type=named_number, nargs="+", metavar="Q", help=help_text)
+
+
+def named_number(word: str) -> float | tuple[str, float]:
+    """Parse a number, or NAME=NUMBER into both."""
+    name, equals, number = word.rpartition("=")
+    try:
+        return (name, float(number)) if equals else float(word)
+    except ValueError as error:
+        raise argparse.ArgumentTypeError(f"{word!r}: a number or NAME=NUMBER is required") from error
 
 
 def assignment(word: str) -> str:
@@ -156,16 +167,22 @@ def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
     return model_of(arguments, source)
 
 
-def motors_of(model: SoftModel, words: Sequence[float] | None, option: str = "--motors") -> FloatArray:
+def motors_of(model: SoftModel, words: Sequence[Any] | None, option: str = "--motors") -> FloatArray:
     """Return the actuator coordinates given by an option, or the relaxed ones without it, shape (n_motors,) [rad, m, N or Pa].
 
     Raises:
         ParameterError: If there are more or fewer numbers than actuators (which are named), or they are out of range.
+        NameNotFound: If there is no actuator of a name.
     """
     if words is None:
         return np.array(model.relaxed_motors)
-    check_one_each(option, words, model.motor_joints, model.actuators.units)
-    return model.checked_motors(words, option)
+    named = [word for word in words if isinstance(word, tuple)]
+    if not named:
+        return model.checked_motors(words, option)
+    if len(dict(named)) < len(words):
+        given = " ".join("{}={:g}".format(*word) if isinstance(word, tuple) else f"{word:g}" for word in words)
+        raise ParameterError(option, given, "numbers in order, or NAME=NUMBER once for each actuator")
+    return model.checked_motors(dict(named), option)
 
 
 def check_one_each(option: str, words: Sequence[float], names: Sequence[str], units: Sequence[str]) -> None:

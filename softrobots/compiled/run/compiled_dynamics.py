@@ -161,6 +161,7 @@ class CompiledDynamics(CompiledStatics):
         """
         run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
         layout, n, strains = run.layout, self._model.n_springs, list(self._unknowns.strains)
+        q_motors = self._model.actuators.in_order(q_motors, "q_motors")
         path = [q_motors] * 3 if np.ndim(q_motors) < 2 else finite_array("q_motors", q_motors, (3, self._motors), "rad")
         state = finite_array("q_springs", q_springs, (n,), "rad"), finite_array("velocities", velocities, (n,), "rad/s")
         w = run.workspace()

@@ -106,7 +106,7 @@ class CompiledModel(CompiledDynamics):
         check_feels(self._model)
         run = self._run(gravity is not None)
         motors = self._actuation.checked(q_motors)
-        torques = finite_array("motor_torques", motor_torques, self._shape, "N m")
+        torques = self._model.actuators.checked_loads(motor_torques, "motor_torques")
         status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
         estimate = CompiledLoadEstimate(w, run.layout, self._actuation, motors, Status(status))
         if status != Status.CERTIFIED:
@@ -137,7 +137,11 @@ class CompiledModel(CompiledDynamics):
         """
         check_feels(self._model)
         run = self._run(gravity is not None)
-        motors, torques = batch_rows(q_motors=(q_motors, self._motors), motor_torques=(motor_torques, self._motors))
+        named = self._model.actuators.in_order
+        motors, torques = batch_rows(
+            q_motors=(named(q_motors, "q_motors"), self._motors),
+            motor_torques=(named(motor_torques, "motor_torques"), self._motors),
+        )
         down = gravity_vector(gravity)
         bad = unusable(motors, torques) | self._actuation.unsuited(motors)
         motors, torques = without(motors, bad, self._model.relaxed_motors), without(torques, bad)
@@ -185,7 +189,7 @@ class CompiledModel(CompiledDynamics):
         goals, poses = flat_targets(targets)
         run = self._run(gravity is not None, poses)
         positive_number("tolerance", tolerance, "m")
-        begin = relaxed if q_motors0 is None else q_motors0
+        begin = relaxed if q_motors0 is None else self._model.actuators.in_order(q_motors0, "q_motors0")
         springs = self._model.rest if q_springs0 is None else q_springs0
         points, loads, motors, unknowns = batch_rows(
             targets=(goals, run.layout.target_size),

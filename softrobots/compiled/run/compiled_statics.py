@@ -203,7 +203,8 @@ class CompiledStatics:
             ParameterError: If a shape differs, gravity is not finite, or the number of threads is not positive.
         """
         run = self._run(gravity is not None)
-        motors, loads = batch_rows(q_motors=(q_motors, self._model.n_motors), forces=(forces, 3))
+        rows = self._model.actuators.in_order(q_motors, "q_motors")
+        motors, loads = batch_rows(q_motors=(rows, self._model.n_motors), forces=(forces, 3))
         down = gravity_vector(gravity)
         bad = unusable(motors, loads) | self._actuation.unsuited(motors)
         motors, loads = without(motors, bad, self._model.relaxed_motors), without(loads, bad)

@@ -32,8 +32,9 @@ class MotionCases:
         springs = springs.q_springs if isinstance(springs, EquilibriumBatch) else springs
         self._paths = [MotorPath(model, one, end) for one in _moving(q_motors)]
         self._loads = [TimeLoad(model, one, None, end) for one in _moving(forces)]
+        motors = model.relaxed_motors if self._paths else model.actuators.in_order(q_motors, "q_motors")
         arrays = {
-            "q_motors": (model.relaxed_motors if self._paths else q_motors, model.n_motors),
+            "q_motors": (motors, model.n_motors),
             "forces": (np.zeros(3) if self._loads or forces is None else forces, 3),
             "starts": (model.rest if springs is None else springs, model.n_springs),
             "velocities": (np.zeros(model.n_springs) if rates is None else rates, model.n_springs),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -131,7 +131,8 @@ class Course:
             raise ParameterError("parameters", None, "given, for a robot that is a function of them")
         first = model if self._grown is None else self._grown(float(given[0]))  # type: ignore[index]
         self._model = check_frictionless(first, "friction at contacts")
-        columns = {"q_motors": (q_motors, first.n_motors, "rad")}
+        rows = first.actuators.in_order(q_motors, "q_motors")
+        columns: dict[str, Any] = {"q_motors": (rows, first.n_motors, first.actuators.described)}
         for name, value in loads.items():
             several = value if isinstance(value, Mapping) else {"": value}
             size, unit = {"force": (3, "N"), "wrench": (6, "N, N m"), "gravity": (3, "m/s^2")}[name]
@@ -265,7 +266,7 @@ def _first(course: Course, friction: float, start: Equilibrium | None) -> Rest:
     return rest
 
 
-def _rows(name: str, value: Any, size: int, unit: str) -> FloatArray:
+def _rows(name: str, value: Any, size: int, unit: str | Sequence[str]) -> FloatArray:
     """One row, or one a parameter, shape (1 or n, size)."""
     given = finite_array(name, value, None, unit)
     return finite_array(name, given[None] if given.ndim == 1 else given, (None, size), unit)
