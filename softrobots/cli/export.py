@@ -42,10 +42,12 @@ def add_parser(subparsers: Any) -> None:
         "--welded", action="store_true", help="fix the motors where they are, make springs of muscles and tendons"
     )
     help_text = (
-        "damping of the springs: that of the file; a time [s], by which their stiffness is multiplied; or critical, for the "
-        "slowest mode, which settles without swinging (file)"
+        "damping of the springs: that of the file; a time [s], by which their stiffness is multiplied; critical, for the "
+        "slowest mode, which settles without swinging; or numbers by joint [N m s/rad or N s/m] (file)"
     )
-    parser.add_argument("--damping", type=_damping, metavar="file|TIME|critical", help=help_text)
+    parser.add_argument("--damping", type=_damping, metavar="file|TIME|critical|JOINT=D,..", help=help_text)
+    help_text = "damping ratio of the slowest mode at rest, instead of --damping [-] (what --damping says)"
+    add_numbers(parser, "--damping-ratio", "Z", help_text)
     add_gravity(parser)
     add_environment(parser)
     add_numbers(parser, "--friction", "MU", "coefficient of friction of the obstacles [-] (0)")
@@ -62,6 +64,7 @@ def run(arguments: argparse.Namespace) -> None:
     chosen = {
         "actuators": "welded" if arguments.welded else None,
         "damping": arguments.damping,
+        "damping_ratio": arguments.damping_ratio,
         "gravity": gravity_of(arguments),
         "environment": environment_of(arguments),
         "friction": arguments.friction,
@@ -87,9 +90,11 @@ def run(arguments: argparse.Namespace) -> None:
     print_answer(arguments, answer, [f"{path}: {model.pinocchio.name}, {kept}; {name}, for {FORMATS[name].meaning}"])
 
 
-def _damping(word: str) -> str | float:
-    """A word as it is, a number as a number."""
+def _damping(word: str) -> str | float | dict[str, float]:
+    """A word as it is, a number as a number, JOINT=D,.. as a mapping."""
     try:
+        if "=" in word:
+            return {name: float(number) for name, _, number in (part.partition("=") for part in word.split(","))}
         return float(word)
     except ValueError:
         return word

@@ -14,6 +14,7 @@ from softrobots.core.errors import DescriptionError
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.environment.environment import Environment
+from softrobots.export.damping import DampingRule
 from softrobots.export.meshes import MeshFiles, MeshFolder, mujoco_reads
 from softrobots.export.mjcf_contact import (
     SOFTNESS,
@@ -42,7 +43,8 @@ def to_mjcf(
     q_motors: Any = None,
     *,
     actuators: str = "driven",
-    damping: str | float = "file",
+    damping: DampingRule = "file",
+    damping_ratio: float | None = None,
     gravity: Any = None,
     limits: bool = True,
     environment: Environment | None = None,
@@ -69,8 +71,9 @@ def to_mjcf(
         model: The robot.
         q_motors: Motor joints, then inputs of actuators, shape (n_motors,) [rad, m, N or Pa]; relaxed by default.
         actuators: "driven", or "welded": motor joints become fixed, actuators become springs.
-        damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
-            without swinging (`softrobots.export.damping`).
+        damping: Of the spring joints: "file", that of the description; a damping time [s]; a mapping {joint: N m s/rad or
+            N s/m}; or "critical", which settles without swinging (`softrobots.export.damping`).
+        damping_ratio: In place of it, the damping ratio of the slowest mode at rest, motors held, weightless [-].
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
         environment: Obstacles around the robot, which stand still.
@@ -81,6 +84,7 @@ def to_mjcf(
         MJCF text.
 
     Raises:
+        NameNotFound: If `damping` names a joint that has no spring.
         ParameterError: If an argument does not fit, or the robot has sections of constant strain, springs that are not linear,
             or actuators that MuJoCo does not have: driven McKibben muscles; welded, given lengths and tensions along winding
             routes. If obstacles move, or friction is given without any.
@@ -90,7 +94,14 @@ def to_mjcf(
     """
     field = checked_gravity(gravity)
     robot = prepare(
-        model, q_motors, actuators=actuators, damping=damping, apart=SPRINGY, environment=environment, friction=friction
+        model,
+        q_motors,
+        actuators=actuators,
+        damping=damping,
+        damping_ratio=damping_ratio,
+        apart=SPRINGY,
+        environment=environment,
+        friction=friction,
     )
     _refuse(robot.tree)
     tendons = tendons_of(model, robot, welded=actuators == "welded")

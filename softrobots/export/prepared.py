@@ -19,7 +19,7 @@ from softrobots.description.rigid_tree_urdf import read_rigid_tree
 from softrobots.description.urdf_tags import SpringTag
 from softrobots.environment.capsules import capsule_tags
 from softrobots.export.contact_shapes import ContactShapes, contact_shapes, with_capsules
-from softrobots.export.damping import checked_damping, damped, lowest_frequency, mass_matrix, rule_text
+from softrobots.export.damping import Damping, DampingRule, damped, lowest_frequency, mass_matrix
 from softrobots.export.held import ACTUATORS, check_linear, hold, weld
 from softrobots.export.servos import Motor, motors_of
 from softrobots.model.soft_model import SoftModel
@@ -58,7 +58,8 @@ def prepare(
     q_motors: Any = None,
     *,
     actuators: str = "driven",
-    damping: str | float = "file",
+    damping: DampingRule = "file",
+    damping_ratio: float | None = None,
     apart: Sequence[str] = (),
     environment: Any = None,
     friction: Any = 0.0,
@@ -69,12 +70,14 @@ def prepare(
         model: The robot.
         q_motors: Motor joints, then inputs of actuators, shape (n_motors,) [rad, m, N or Pa]; relaxed by default.
         actuators: "driven" or "welded".
-        damping: "file", "critical" or a damping time [s], see `softrobots.export.damping`.
+        damping: "file", "critical", a damping time [s] or numbers by joint, see `softrobots.export.damping`.
+        damping_ratio: In place of it, the damping ratio of the slowest mode at rest [-].
         apart: Kinds of actuators that are no part of the springs if they are welded.
         environment: Obstacles around the robot, see `contact_shapes`.
         friction: Coefficient of friction.
 
     Raises:
+        NameNotFound: If `damping` names a joint that has no spring.
         ParameterError: If `check_linear` refuses the model; a choice is unknown; `q_motors` does not fit the robot or, driven,
             is beyond the limits of the actuators; actuators are to be welded that are no joint springs (`hold`); or
             `contact_shapes` refuses the surroundings.
@@ -82,7 +85,7 @@ def prepare(
     """
     checked = check_linear(model)
     choice("actuators", actuators, ACTUATORS)
-    rule = checked_damping(damping)
+    rule = Damping.of(checked, damping, damping_ratio)
     contact = contact_shapes(checked, environment, friction)
     values = checked.relaxed_motors if q_motors is None else checked.checked_motors(q_motors)
     structure, tree = checked.structure, read_rigid_tree(checked.urdf)
@@ -98,12 +101,12 @@ def prepare(
     _refuse_massless(tree)
     if contact is not None:
         tree = with_capsules(tree, capsule_tags(checked))
-    swings = rule == "critical" and bool(springs)
+    swings = rule.ratio is not None and bool(springs)
     mass = mass_matrix(checked, values) if swings or (positions and not welded) else np.zeros((0, 0))
     frequency = lowest_frequency(checked, mass) if swings else None
-    time = rule if isinstance(rule, float) else None if frequency is None else 2.0 / frequency
+    time = rule.time if frequency is None or rule.ratio is None else 2.0 * rule.ratio / frequency
     return PreparedRobot(
-        tree=replace(damped(tree, springs, time), springs=springs),
+        tree=replace(damped(tree, springs, time, rule.joints), springs=springs),
         tip=tip_body(tree, checked.tip),
         motors=() if welded else motors_of(checked, tree.joints, positions, mass),
         q_motors=values,
@@ -111,7 +114,7 @@ def prepare(
         damping_time=time,
         frequency=frequency,
         remarks=_remarks(checked, values, welded),
-        damping_rule=rule_text(rule, frequency),
+        damping_rule=rule.text(frequency),
         contact=contact,
     )
 

@@ -15,6 +15,7 @@ from softrobots.core.checks import LARGEST
 from softrobots.core.errors import DescriptionError, ParameterError
 from softrobots.description.rigid_tree import Body, Joint, Placement, RigidTree, Shape, number_text
 from softrobots.environment.environment import Environment
+from softrobots.export.damping import DampingRule
 from softrobots.export.meshes import MeshFiles, MeshFolder, drake_collides, drawn_anywhere
 from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
 from softrobots.export.sdf_contact import HARDNESS, write_hardness, write_obstacles
@@ -31,7 +32,8 @@ def to_sdf(
     q_motors: Any = None,
     *,
     actuators: str = "driven",
-    damping: str | float = "file",
+    damping: DampingRule = "file",
+    damping_ratio: float | None = None,
     limits: bool = True,
     environment: Environment | None = None,
     friction: float = 0.0,
@@ -61,8 +63,9 @@ def to_sdf(
         q_motors: Motor joints, then tensions or pressures, shape (n_motors,) [rad, m, N or Pa]; relaxed by default. For driven
             motors, they only affect the frequency that sets the damping.
         actuators: "driven", or "welded": motor joints become fixed, tensions become part of the springs.
-        damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
-            without swinging (`softrobots.export.damping`).
+        damping: Of the spring joints: "file", that of the description; a damping time [s]; a mapping {joint: N m s/rad or
+            N s/m}; or "critical", which settles without swinging (`softrobots.export.damping`).
+        damping_ratio: In place of it, the damping ratio of the slowest mode at rest, motors held, weightless [-].
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
         environment: Obstacles around the robot, which stand still.
         friction: Coefficient of friction between the robot and them.
@@ -73,6 +76,7 @@ def to_sdf(
         SDF text.
 
     Raises:
+        NameNotFound: If `damping` names a joint that has no spring.
         ParameterError: If an argument does not fit, muscles are to be driven, or the robot has sections of constant strain,
             springs that are not linear, or muscles that are no joint springs when they are welded. If obstacles move or are
             meshes without a folder, or friction is given without any.
@@ -81,7 +85,15 @@ def to_sdf(
         OutputError: If the file of a mesh cannot be written.
     """
     folder = MeshFolder.of(mesh_folder)
-    robot = prepare(model, q_motors, actuators=actuators, damping=damping, environment=environment, friction=friction)
+    robot = prepare(
+        model,
+        q_motors,
+        actuators=actuators,
+        damping=damping,
+        damping_ratio=damping_ratio,
+        environment=environment,
+        friction=friction,
+    )
     if model.muscles and actuators == "driven":
         raise ParameterError("actuators", actuators, '"welded" for a robot with muscles or tendons, which SDF does not have')
     tree = robot.tree

@@ -21,7 +21,7 @@ from softrobots.description.rigid_tree_urdf import read_rigid_tree, write_rigid_
 from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.environment.environment import Environment
 from softrobots.export.contact_shapes import ContactShapes
-from softrobots.export.damping import lowest_frequency, mass_matrix
+from softrobots.export.damping import DampingRule, lowest_frequency, mass_matrix
 from softrobots.export.held import HeldRobot, hold
 from softrobots.export.prepared import checked_gravity, prepare, tip_body
 from softrobots.export.python_text import assignment, block, filled, table
@@ -43,7 +43,8 @@ def to_pybullet(
     q_motors: Any = None,
     *,
     actuators: str = "driven",
-    damping: str | float = "file",
+    damping: DampingRule = "file",
+    damping_ratio: float | None = None,
     gravity: Any = None,
     limits: bool = True,
     environment: Environment | None = None,
@@ -63,8 +64,9 @@ def to_pybullet(
         q_motors: Motor joints, then tensions or pressures, shape (n_motors,) [rad, m, N or Pa]; relaxed by default. Tensions
             become part of the springs.
         actuators: "driven": PyBullet's position control holds the motors, whatever the load; "welded": their joints are fixed.
-        damping: Of the spring joints: "file", that of the description; a damping time [s]; or "critical", which settles
-            without swinging (`softrobots.export.damping`).
+        damping: Of the spring joints: "file", that of the description; a damping time [s]; a mapping {joint: N m s/rad or
+            N s/m}; or "critical", which settles without swinging (`softrobots.export.damping`).
+        damping_ratio: In place of it, the damping ratio of the slowest mode at rest, motors held, weightless [-].
         gravity: Gravity, shape (3,) [m/s^2], world axes, used when the file is run as a script; None: weightless.
         limits: Whether the springs have their limits; the statics reports them and goes beyond.
         environment: Obstacles around the robot, which stand still; without contact of the robot with itself.
@@ -74,6 +76,7 @@ def to_pybullet(
         Text of the file.
 
     Raises:
+        NameNotFound: If `damping` names a joint that has no spring.
         ParameterError: If an argument does not fit; if the robot has no springs, sections of constant strain, springs that are
             not linear, actuators that are no joint springs when they are held, or more joints than PyBullet supports; if
             obstacles move, or the robot is to touch itself.
@@ -81,7 +84,15 @@ def to_pybullet(
     """
     held = _held(model, q_motors)
     field = checked_gravity(gravity)
-    robot = prepare(model, q_motors, actuators=actuators, damping=damping, environment=environment, friction=friction)
+    robot = prepare(
+        model,
+        q_motors,
+        actuators=actuators,
+        damping=damping,
+        damping_ratio=damping_ratio,
+        environment=environment,
+        friction=friction,
+    )
     if robot.contact is not None and robot.contact.apart is not None:
         raise ParameterError(
             "environment", environment, "one without self_contact: PyBullet's links do not touch each other here"
