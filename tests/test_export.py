@@ -786,7 +786,7 @@ def test_command_line(tmp_path: Path, capsys: pytest.CaptureFixture[str], arm: s
         (["inflatable_arm", "-o", "h.py"], "format must be given"),
         (["no_such_robot", "-o", "h.xml"], "no robot or file"),
         (["inflatable_arm", "-o", "h.sdf", "--gravity"], "formats that have it"),
-        (["inflatable_arm", "-o", "h.xml", "--motors", "1"], "--motors must be 3 numbers"),
+        (["inflatable_arm", "-o", "h.xml", "--motors", "1"], "it has shape (1,)): motor_1 [rad]"),
     ):
         assert cli.main(["export", *refused[:2], str(tmp_path / refused[2]), *refused[3:]]) == 2
         assert told in capsys.readouterr().err
