@@ -17,9 +17,9 @@ import numpy as np
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.cli.reports.answers import aligned
 from softrobots.core.checks import non_negative_number, positive_integer, positive_number
 from softrobots.core.files import make_folder
+from softrobots.core.summary import aligned
 from softrobots.view.figures import canvas, contacts, loaded_robot
 from studies.contact import examples, pictures
 from studies.shared.command_line import serve, tell_written

@@ -15,9 +15,9 @@ import numpy as np
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.cli.reports.answers import aligned
 from softrobots.core.checks import positive_number
 from softrobots.core.files import make_folder
+from softrobots.core.summary import aligned
 from softrobots.view.figures import canvas, motions
 from studies.motion import examples
 from studies.shared.command_line import tell_written

@@ -15,8 +15,8 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.cli.reports.equilibrium_report import stability_words
 from softrobots.core.errors import NeutralEquilibrium
+from softrobots.statics.equilibrium_summary import stability_words
 from softrobots.statics.stability import Stability
 from softrobots.view.figures.loaded_robot import loaded_shape
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint

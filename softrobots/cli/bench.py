@@ -16,11 +16,12 @@ from typing import Any, NamedTuple
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from softrobots.cli.reports.answers import add_json, aligned, print_answer, written_lines
+from softrobots.cli.reports.answers import add_json, print_answer, written_lines
 from softrobots.compiled.run.compiled_model import CompiledModel, compile_model
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file, write_text
 from softrobots.core.progress import with_progress
+from softrobots.core.summary import aligned
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import InflatableArm

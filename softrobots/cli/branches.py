@@ -11,9 +11,10 @@ import numpy as np
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
-from softrobots.cli.reports.answers import add_json, aligned, formatted, print_answer
+from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.checks import FloatArray, unit_vector
 from softrobots.core.errors import NoCriticalLoad
+from softrobots.core.summary import aligned, formatted
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.buckling.post_buckling import post_buckling_branches
 from softrobots.view.figures.equilibria import branches

@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import softrobots
-from softrobots.cli.reports.answers import add_json, aligned, print_answer
+from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.tools.checks import row_problems
 from softrobots.cli.tools.kinematics import KinematicsRow, compare_kinematics
 from softrobots.cli.tools.known_tools import installed_tools
 from softrobots.cli.tools.packages import EXTRAS, missing_of_extras, required_packages
 from softrobots.compiled.run.backends import available_backend, cache_folder, cache_is_kept
 from softrobots.core.errors import SoftRobotsError, ViewerError
+from softrobots.core.summary import aligned
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.robots import ROBOTS
 from softrobots.view.browser import find_chromium

@@ -12,9 +12,10 @@ import numpy as np
 from softrobots import helix
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.output_files import add_plot, check_plot, write_plot
-from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, lines_of, print_answer
+from softrobots.cli.reports.answers import Fact, add_json, answer_of, lines_of, print_answer
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.core.files import new_file
+from softrobots.core.summary import aligned
 from softrobots.helix.template import write_template
 from softrobots.robots import HelixTube
 from softrobots.view.figures import helices

@@ -13,7 +13,7 @@ from softrobots.cli.options.load_argument import add_environment, add_loads, loa
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
-from softrobots.cli.reports.ik_report import solution_answer, solution_lines, trajectory_answer, trajectory_lines
+from softrobots.cli.reports.ik_report import solution_answer, trajectory_answer
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel
@@ -111,7 +111,7 @@ def run(arguments: argparse.Namespace) -> None:
         progress="waypoints",
     )
     files = save(arguments, trajectory) + write_plot(arguments, lambda: trajectories.poses(trajectory))
-    print_answer(arguments, trajectory_answer(trajectory), trajectory_lines(trajectory), files)
+    print_answer(arguments, trajectory_answer(trajectory), trajectory.summary(None), files)
 
 
 def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, Any]) -> None:
@@ -126,7 +126,7 @@ def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, A
             raise
         raise ParameterError("--rpy", arguments.rpy, error.requirement) from error
     files = save(arguments, solution) + write_plot(arguments, lambda: loaded_shape(solution.equilibrium))
-    print_answer(arguments, solution_answer(solution), solution_lines(solution), files)
+    print_answer(arguments, solution_answer(solution), solution.summary(None), files)
 
 
 def _refuse_contradictions(arguments: argparse.Namespace) -> None:

@@ -3,10 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
 from typing import Any
-
-import numpy as np
 
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
 from softrobots.cli.options.load_argument import add_environment, environment_of
@@ -19,11 +16,12 @@ from softrobots.cli.options.robot_argument import (
     one_or_each,
     statics_model_of,
 )
-from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, attributes, formatted, print_answer
-from softrobots.cli.reports.equilibrium_report import equilibrium_answer, equilibrium_lines, joined_units
-from softrobots.model.actuators import load_units
+from softrobots.cli.reports.answers import Fact, add_json, answer_of, attributes, print_answer
+from softrobots.cli.reports.equilibrium_report import equilibrium_answer
+from softrobots.model.actuators import joined_units, load_units
 from softrobots.model.loader import with_points
 from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feels, estimate_load
+from softrobots.statics.load_summary import unit_per_newton
 
 _EXAMPLES = """examples:
   softrobots load inflatable_arm --motors 0.3 0.6 -0.8 --torques 10.193 -16.605 -7.675
@@ -108,8 +106,7 @@ def run(arguments: argparse.Namespace) -> None:
         max_iterations=arguments.max_iterations,
     )
     files = save(arguments, estimate)
-    lines = [*equilibrium_lines(estimate.equilibrium), "", *_lines(estimate)]
-    print_answer(arguments, _answer(estimate), lines, files)
+    print_answer(arguments, _answer(estimate), estimate.summary(None), files)
 
 
 def _answer(estimate: LoadEstimate) -> dict[str, Any]:
@@ -117,12 +114,12 @@ def _answer(estimate: LoadEstimate) -> dict[str, Any]:
     torques = joined_units(load_units(motors))
     facts = [
         Fact("force", estimate.force, "N"),
-        Fact("force_std", _deviations(estimate), "N"),
+        Fact("force_std", estimate.force_std, "N"),
         Fact("covariance", estimate.covariance, "N^2"),
         Fact("covariance_parts", dict(estimate.covariance_parts), "N^2"),
         *attributes(
             estimate,
-            singular_values=_per_newton(motors),
+            singular_values=unit_per_newton(motors),
             condition_number="-",
             unobservable_directions="-",
             measured_torques=torques,
@@ -135,32 +132,3 @@ def _answer(estimate: LoadEstimate) -> dict[str, Any]:
         for other in estimate.alternatives
     ]
     return {**answer_of(facts), "equilibrium": equilibrium_answer(estimate.equilibrium), "alternatives": others}
-
-
-def _per_newton(motors: Sequence[str]) -> str:
-    """Unit of what actuators of these units feel of a force, over the force."""
-    return joined_units([{"N m": "m", "N": "-"}[unit] for unit in load_units(motors)])
-
-
-def _deviations(estimate: LoadEstimate) -> Any:
-    """Standard deviation of each component of the force, over the observable directions [N]; None without noise."""
-    return None if estimate.covariance is None else np.sqrt(np.maximum(np.diag(estimate.covariance), 0.0))
-
-
-def _lines(estimate: LoadEstimate) -> list[str]:
-    deviations = _deviations(estimate)
-    rows = [(f"force on {estimate.frame}", f"{formatted(estimate.force)} N")]
-    if deviations is not None:
-        rows.append(("  standard deviation", f"{formatted(deviations)} N"))
-    if len(estimate.covariance_parts) > 1:
-        for name, part in estimate.covariance_parts.items():
-            rows.append((f"    by {name.replace('_', ' ')}", f"{formatted(np.sqrt(np.diag(part)))} N"))
-    rows += [("  explained as well by", f"{formatted(other.force)} N") for other in estimate.alternatives]
-    motors = estimate.equilibrium.model.actuators.units
-    felt = f"{formatted(estimate.singular_values)} {_per_newton(motors)}"
-    rows.append(("singular values", f"{felt} (condition number {estimate.condition_number:.3g})"))
-    directions = [("NOT FELT along", formatted(direction)) for direction in estimate.unobservable_directions]
-    rows += directions or [("not felt along", "no direction")]
-    left = f"{estimate.residual:.2g} {joined_units(load_units(motors))}"
-    rows.append(("torques unexplained", f"{left}, {estimate.iterations} iterations by {estimate.method}"))
-    return aligned(rows)

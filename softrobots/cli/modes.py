@@ -20,9 +20,10 @@ from softrobots.cli.options.output_files import (
     write_plot,
 )
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, one_or_each, statics_model_of
-from softrobots.cli.reports.answers import add_json, aligned, print_answer
+from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.core.files import new_file
+from softrobots.core.summary import aligned
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.model.actuators import load_units
 from softrobots.statics.equilibrium import solve_equilibrium

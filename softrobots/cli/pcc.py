@@ -11,11 +11,12 @@ import numpy as np
 from softrobots import constant_curvature
 from softrobots.cli.options.command_line import add_numbers, refuse_too_large
 from softrobots.cli.options.output_files import add_plot, check_plot, write_plot
-from softrobots.cli.reports.answers import Fact, add_json, aligned, answer_of, print_answer
+from softrobots.cli.reports.answers import Fact, add_json, answer_of, print_answer
 from softrobots.constant_curvature import Arc
 from softrobots.constant_curvature.poses import FRAMES
 from softrobots.core.checks import FloatArray, positive_array
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import aligned
 from softrobots.model.loader import load_model
 from softrobots.robots import PccArm
 from softrobots.statics.inverse_kinematics import solve_ik

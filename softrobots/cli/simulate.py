@@ -23,17 +23,19 @@ from softrobots.cli.options.output_files import (
 )
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
-from softrobots.cli.reports.motion_report import motion_answer, motion_lines
+from softrobots.cli.reports.motion_report import motion_answer
 from softrobots.core.checks import FloatArray, finite_array, positive_number
 from softrobots.core.csv_table import Table, read_table
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import new_file
 from softrobots.core.result_file import load_result
+from softrobots.core.summary import text_of
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.simulation import simulate
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad, curve
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
+from softrobots.statics.equilibrium_summary import loaded_robot
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
 from softrobots.view.figures import motions
@@ -128,7 +130,8 @@ def run(arguments: argparse.Namespace) -> None:
         with Viewer(model) as viewer:
             viewer.animate(motion)
             files.append(viewer.write_html(arguments.page, title=str(model.pinocchio.name), overwrite=arguments.overwrite))
-    print_answer(arguments, motion_answer(motion, load), motion_lines(motion, load), files)
+    lines = text_of([loaded_robot(model, load), *motion.summary_parts()[1:]], None)
+    print_answer(arguments, motion_answer(motion, load), lines, files)
     if motion.interrupted:
         raise KeyboardInterrupt
 

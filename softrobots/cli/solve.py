@@ -9,10 +9,11 @@ from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
-from softrobots.cli.reports.answers import add_json, aligned, formatted, print_answer
-from softrobots.cli.reports.equilibrium_report import coordinate_lines, equilibrium_answer, summary_lines
+from softrobots.cli.reports.answers import add_json, print_answer
+from softrobots.cli.reports.equilibrium_report import equilibrium_answer
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import NeutralEquilibrium, NoCriticalLoad
+from softrobots.core.summary import Part, Table, formatted, text_of
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.buckling.critical_load import critical_load
 from softrobots.statics.elastic_state import TOLERANCE
@@ -83,43 +84,39 @@ def run(arguments: argparse.Namespace) -> None:
         tolerance=arguments.tolerance,
         max_iterations=arguments.max_iterations,
     )
-    answer, lines = equilibrium_answer(equilibrium), coordinate_lines(equilibrium)
-    summary = summary_lines(equilibrium)
+    answer, parts = equilibrium_answer(equilibrium), equilibrium.summary_parts()
     if arguments.compliance:
-        _add_compliance(model, equilibrium, answer, lines)
+        parts[-1:] = [*_compliance(model, equilibrium, answer), parts[-1]]
+    lines = text_of(parts, None)
     if arguments.critical_load is not None:
-        _add_critical_load(model, equilibrium, arguments, answer, summary)
+        lines += f"\ncritical load  {_critical_load(model, equilibrium, arguments, answer)}"
     files = save(arguments, equilibrium) + write_plot(arguments, lambda: loaded_shape(equilibrium))
-    print_answer(arguments, answer, [*lines, "", *summary], files)
+    print_answer(arguments, answer, lines, files)
 
 
-def _add_compliance(model: SoftModel, equilibrium: Equilibrium, answer: dict[str, Any], lines: list[str]) -> None:
+def _compliance(model: SoftModel, equilibrium: Equilibrium, answer: dict[str, Any]) -> list[Part]:
     answer["units"]["compliance"] = "m/N, m/(N m); rad/N, rad/(N m)"
     try:
         matrix = answer["compliance"] = compliance(model, equilibrium)
     except NeutralEquilibrium as error:
         answer["compliance"] = None
-        lines += ["", f"compliance  none: {error}"]
-        return
+        return [f"compliance  none: {error}"]
     rows = [(name, *(f"{number:.3e}" for number in row)) for name, row in zip(_MOTIONS, matrix, strict=True)]
-    lines += ["", "compliance of the tip: motion [m] and turn [rad] per force [N] and moment [N m]"]
-    lines += aligned([("", *_WRENCH), *rows], right=range(1, 7))
+    title = "compliance of the tip: motion [m] and turn [rad] per force [N] and moment [N m]"
+    return [Table([("", *_WRENCH), *rows], right=range(1, 7), title=title)]
 
 
 _MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
 _WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
 
 
-def _add_critical_load(
-    model: SoftModel, equilibrium: Equilibrium, arguments: argparse.Namespace, answer: dict[str, Any], summary: list[str]
-) -> None:
+def _critical_load(model: SoftModel, equilibrium: Equilibrium, arguments: argparse.Namespace, answer: dict[str, Any]) -> str:
     answer["units"] |= {"critical_load": "N", "stable_up_to": "N"}
     direction, gravity = arguments.critical_load, equilibrium.load.gravity
     try:
         force = critical_load(model, equilibrium.q_motors, direction, frame=arguments.frame, gravity=gravity)
     except NoCriticalLoad as error:
         answer |= {"critical_load": None, "stable_up_to": error.max_force}
-        summary.append(f"critical load  none: {error}")
-        return
+        return f"none: {error}"
     answer |= {"critical_load": force, "stable_up_to": force}
-    summary.append(f"critical load  {formatted(force)} N along {formatted(direction)}")
+    return f"{formatted(force)} N along {formatted(direction)}"

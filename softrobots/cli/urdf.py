@@ -10,10 +10,11 @@ from typing import Any
 
 from softrobots.cli.options.robot_argument import add_robot, robot_file, source_of
 from softrobots.cli.options.robot_parameters import first_sentence, robot_parameters, write_robot, xacro_parameters
-from softrobots.cli.reports.answers import add_json, aligned, print_answer
+from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.tools.checks import check_description
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file, write_text
+from softrobots.core.summary import aligned
 from softrobots.description.sources import read_source
 from softrobots.description.urdf_rules import Finding
 from softrobots.robots import ROBOTS, Robot

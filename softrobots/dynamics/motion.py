@@ -9,6 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.summary import Part, Summarised
+from softrobots.dynamics.motion_summary import motion_parts
 from softrobots.model.link_limits import LinkLimits, link_limits
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
@@ -57,8 +59,8 @@ class MotionState:
     """Their rates, shape (n_springs,) [rad/s or m/s]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Motion:
+@dataclass(frozen=True, eq=False, repr=False)
+class Motion(Summarised):
     """A simulated motion, a row for each time."""
 
     model: SoftModel
@@ -101,6 +103,10 @@ class Motion:
             f"Motion({self.model.pinocchio.name}, {len(self.time)} rows until {self.time[-1]:.6g} s, "
             f"{len(self.steps) - 1} steps, tip_error={self.tip_error}, interrupted={self.interrupted})"
         )
+
+    def summary_parts(self) -> list[Part]:
+        """Return ranges of tip, motors and springs, then energies, steps and the error."""
+        return motion_parts(self)
 
     def configuration(self, row: int) -> FloatArray:
         """Pinocchio's configuration in a row, shape (nq,)."""

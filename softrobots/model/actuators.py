@@ -243,6 +243,11 @@ def load_units(units: Sequence[str]) -> tuple[str, ...]:
     return tuple(_LOAD_UNITS[unit] for unit in units)
 
 
+def joined_units(units: Sequence[str]) -> str:
+    """Return the units of a row of numbers as one text: one unit if all have it, else one for each."""
+    return units[0] if len(set(units)) == 1 else ", ".join(units)
+
+
 def slack_tendons(actuators: Sequence[ActuatorTag], tensions: FloatArray) -> tuple[bool, ...]:
     """Return which of some actuators at these tensions, shape (n,) [N], are slack: elastic tendons without tension."""
     return tuple(one.kind == "elastic" and tension <= 0.0 for one, tension in zip(actuators, tensions.tolist(), strict=True))

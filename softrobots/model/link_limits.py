@@ -8,6 +8,7 @@ of the pieces before and behind it. In a section of constant strain `N` is what 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -17,11 +18,14 @@ import pinocchio as pin
 
 from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.field_help import with_field_help
+from softrobots.core.summary import Table, html_of, text_of
 from softrobots.model.soft_model import SoftModel
 
 _NEAR_PLATEAU, _NEAR_COLLAPSE = 0.99, 0.95  # shares of the largest moment at which a link explains why there is no equilibrium
 
 
+@with_field_help
 class LinkLimits(NamedTuple):
     """Inflated links and the limits of their walls, each at the hinge that is nearest to them; arrays of shape (n_links,).
 
@@ -48,6 +52,44 @@ class LinkLimits(NamedTuple):
     def wrinkling_margins(self) -> FloatArray:
         """Share of `wrinkling_moments` that is left [-]; negative: more than half is slack; minus infinity likewise."""
         return _left(self.moments, self.wrinkling_moments)
+
+    def table(self) -> Table:
+        """Return moment, axial force and limits of each link as a table."""
+        rows = [("link", "moment", "axial", "slack from", "left", "wrinkles", "left")]
+        left = [known_margins(margins) for margins in (self.slack_margins, self.wrinkling_margins)]
+        for number, (values, *margins) in enumerate(zip(zip(*self[:4], strict=True), *left, strict=True), start=1):
+            moment, force, slack, wrinkling = (f"{value:#.4g}" for value in values)
+            shares = ["-" if margin is None else f"{100.0 * margin:.1f} %" for margin in margins]
+            cells = (f"{moment} N m", f"{force} N", f"{slack} N m", shares[0], f"{wrinkling} N m", shares[1])
+            rows.append((str(number), *cells))
+        return Table(rows, right=(1, 2, 3, 4, 5, 6))
+
+    def summary(self) -> str:
+        """Return `table` as text; `print` shows the same."""
+        return text_of([self.table()])
+
+    def _repr_html_(self) -> str:
+        """Show the table in a notebook."""
+        return html_of([self.table()])
+
+    def __str__(self) -> str:
+        """Return the summary."""
+        return self.summary()
+
+    def __repr__(self) -> str:
+        """Number of links and the least margin in a line, instead of arrays."""
+        least = f", {100.0 * self.wrinkling_margins.min():.3g} % of the wrinkling moment left" if len(self.moments) else ""
+        return f"LinkLimits({len(self.moments)} links{least})"
+
+
+def known_margins(margins: FloatArray) -> list[float | None]:
+    """Return margins of inflated links as a list [-]; None for a link whose wall has no tension."""
+    return [margin if math.isfinite(margin) else None for margin in margins.tolist()]
+
+
+def slack_words(margin: float, share: str = "at least") -> str:
+    """Return whether the wall of a link is slack, from the least margin to its first slack fibre [-]."""
+    return f"no, {share} {100.0 * margin:.1f} % of its moment is left" if margin > 0.0 else "YES: by membrane theory"
 
 
 def link_moments(model: SoftModel, torques: FloatArray) -> list[FloatArray]:

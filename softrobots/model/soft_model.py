@@ -20,13 +20,14 @@ from softrobots.model.actuators import Actuators
 from softrobots.model.chain_reader import read_chain
 from softrobots.model.coordinates import Coordinates
 from softrobots.model.pinocchio_data import PinocchioData
+from softrobots.model.robot_summary import SummarisedRobot
 from softrobots.model.serial_chain import SerialChain
 from softrobots.model.springs import SpringGroup, Springs
 from softrobots.model.structure import Structure
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class SoftModel:
+class SoftModel(SummarisedRobot):
     """A robot with actuators (prescribed) and elastic coordinates (free), ready for statics.
 
     Actuators are motor joints, then muscles; `q_motors` everywhere holds joint coordinates, then the inputs of muscles, or is
@@ -64,13 +65,6 @@ class SoftModel:
     """
     robot: Any = None
     """The dataclass of parameters that the model was loaded from; None for a file or text, and for what `load_result` loads."""
-
-    def __repr__(self) -> str:
-        """Name, motors, springs and tip in one line."""
-        return (
-            f"SoftModel({self.pinocchio.name!r}, motors={list(self.motor_joints)}, springs={list(self.spring_joints)}, "
-            f"tip={self.tip!r})"
-        )
 
     def __eq__(self, other: object) -> bool:
         """Whether two models are the same robot: same description, springs, motors and tip."""

@@ -17,6 +17,7 @@ import numpy as np
 
 from softrobots.core.checks import choice, finite_array, finite_number, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
+from softrobots.core.field_help import FieldHelp
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 
@@ -208,7 +209,7 @@ def _colours(name: str, value: Any, count: int, parts: str) -> tuple[tuple[float
 
 
 @dataclass(frozen=True, kw_only=True)
-class XacroRobot:
+class XacroRobot(FieldHelp):
     """Base of a frozen dataclass whose fields (`parameter`) are the arguments of a xacro file."""
 
     XACRO: ClassVar[str | Path]

@@ -10,6 +10,7 @@ import numpy as np
 
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
+from softrobots.core.field_help import FieldHelp
 from softrobots.robots.fields import PerPart, argument_text, numbers
 
 ROUTINGS = ("segment", "base")
@@ -22,7 +23,7 @@ _BEYOND = 1e-9  # by which a route may end behind the tip, relative to the lengt
 
 
 @dataclass(frozen=True, kw_only=True)
-class Route:
+class Route(FieldHelp):
     """A path fixed in the body of a straight arm, along which an actuator runs.
 
     Between the places `at`, distance and azimuth are linear in the position along the backbone: constant values are a straight

@@ -11,12 +11,14 @@ import numpy as np
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, instance_of, read_only
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Part, Summarised
 from softrobots.model.actuators import slack_tendons
 from softrobots.model.link_limits import LinkLimits, link_limits, link_moments
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.contact.contact import Contact, with_contacts
 from softrobots.statics.contact.touch import TOUCHING
+from softrobots.statics.equilibrium_summary import equilibrium_parts
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.stability import Stability, stability
@@ -24,8 +26,8 @@ from softrobots.statics.stability import Stability, stability
 _LENGTH_ROUNDING = np.array([-1e-12, 1e-12])  # [m], of muscle lengths that are computed from the shape
 
 
-@dataclass(frozen=True, eq=False)
-class Equilibrium:
+@dataclass(frozen=True, eq=False, repr=False)
+class Equilibrium(Summarised):
     """A solved static equilibrium; knows its model, load and motors, and can be saved with `softrobots.save_result`.
 
     Torques are loads carried, minus what spring or motor exerts.
@@ -67,6 +69,10 @@ class Equilibrium:
     contact_gradients: FloatArray = field(default_factory=lambda: np.zeros((0, 0)))
     """Derivative of the gap of each pressed contact by the springs, shape (k, n_springs); stability is that of motions along
     which these gaps stay zero."""
+
+    def summary_parts(self) -> list[Part]:
+        """Return tables of motors, actuators, springs, inflated links and contacts, then tip and certificates."""
+        return equilibrium_parts(self)
 
     @cached_property
     def stability(self) -> Stability:

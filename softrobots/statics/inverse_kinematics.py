@@ -13,7 +13,9 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, choice, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError, TargetUnreachable
+from softrobots.core.summary import Part, Summarised, facts, formatted
 from softrobots.environment.environment import Environment
+from softrobots.model.actuators import joined_units
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import ElasticState
 from softrobots.statics.elastostatics import METHODS, solve_springs
@@ -30,8 +32,8 @@ ELBOWS = ("up", "down")
 _SEED = 20210312  # of the random starts
 
 
-@dataclass(frozen=True, eq=False)
-class IkSolution:
+@dataclass(frozen=True, eq=False, repr=False)
+class IkSolution(Summarised):
     """Actuator coordinates for a target; can be saved with `softrobots.save_result`."""
 
     target: FloatArray
@@ -63,6 +65,18 @@ class IkSolution:
         """
         wrist = spherical_wrist(self.equilibrium.model)
         return None if wrist is None else wrist.singularity(self.equilibrium.q)
+
+    def summary_parts(self) -> list[Part]:
+        """Return the equilibrium, then target, errors and motors."""
+        turned = f", {self.orientation_error:.2g} rad" if self.orientation is not None else ""
+        rows = [
+            ("target", f"{formatted(self.target)} m"),
+            ("tip error", f"{self.error:.2g} m{turned}, {self.iterations} steps"),
+            ("motors", f"{formatted(self.q_motors)} {joined_units(self.equilibrium.model.actuators.units)}"),
+            *(("another solution", formatted(other)) for other in self.alternatives),
+            *([("NOTE", self.wrist_singularity)] if self.wrist_singularity else []),
+        ]
+        return [*self.equilibrium.summary_parts(), facts(rows)]
 
 
 def solve_ik(

@@ -18,11 +18,13 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, read_only
 from softrobots.core.errors import LoadNotFound, ParameterError
 from softrobots.core.result_file import text
+from softrobots.core.summary import Part, Summarised
 from softrobots.environment.environment import Environment
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.load_summary import load_parts
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_force.force_search import ANY
 from softrobots.statics.tip_force.load_errors import MeasurementErrors
@@ -32,8 +34,8 @@ METHODS = tuple(SOLVERS)
 """The solvers of `estimate_load`; "alternation" is that of [Troise 2021]."""
 
 
-@dataclass(frozen=True, eq=False)
-class LoadEstimate:
+@dataclass(frozen=True, eq=False, repr=False)
+class LoadEstimate(Summarised):
     """A tip force estimated from motor torques, with its observability; can be saved with `softrobots.save_result`."""
 
     force: FloatArray
@@ -82,6 +84,15 @@ class LoadEstimate:
     def unobservable_direction(self) -> FloatArray | None:
         """The first unobservable direction, shape (3,), or None."""
         return self.unobservable_directions[0] if len(self.unobservable_directions) else None
+
+    @property
+    def force_std(self) -> FloatArray | None:
+        """Standard deviation of each component of the force, over the observable directions, shape (3,) [N]; or None."""
+        return None if self.covariance is None else np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
+
+    def summary_parts(self) -> list[Part]:
+        """Return the equilibrium, then the force with its errors, and what the motors do not feel."""
+        return load_parts(self)
 
 
 def estimate_load(

@@ -14,8 +14,10 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
 from softrobots.core.errors import ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
+from softrobots.core.summary import Part, Summarised
 from softrobots.environment.environment import Environment
 from softrobots.model.friction_coordinates import untouched
+from softrobots.model.link_limits import known_margins
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
@@ -24,14 +26,15 @@ from softrobots.statics.tip_goal import Goal, LoadedTip
 from softrobots.statics.tip_path.closed_loop import paper_steps
 from softrobots.statics.tip_path.waypoints import exact_steps, named
 from softrobots.statics.tip_search import POSITION_TOLERANCE
+from softrobots.statics.trajectory_summary import trajectory_parts
 
 METHODS = ("newton", "fixed_point", "paper")
 """Methods of `follow_trajectory`: exact steps with the springs by Newton or by the recursion of [Troise 2021], or the
 closed-loop inverse kinematics of that paper."""
 
 
-@dataclass(frozen=True, eq=False)
-class Trajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class Trajectory(Summarised):
     """Motor coordinates over a path, with the loaded robot at every waypoint; can be saved with `softrobots.save_result`."""
 
     times: FloatArray
@@ -61,6 +64,11 @@ class Trajectory:
         return read_only(np.array([equilibrium.q_springs for equilibrium in self.equilibria]))
 
     @cached_property
+    def motor_torques(self) -> FloatArray:
+        """Load on each motor, shape (n, n_motors) [N m or N]."""
+        return read_only(np.array([equilibrium.motor_torques for equilibrium in self.equilibria]))
+
+    @cached_property
     def tip_positions(self) -> FloatArray:
         """Position of the loaded tip, shape (n, 3) [m]."""
         return read_only(np.array([equilibrium.tip_position for equilibrium in self.equilibria]))
@@ -85,7 +93,7 @@ class Trajectory:
             return None
         return read_only(np.array([equilibrium.link_moments for equilibrium in self.equilibria]))
 
-    @cached_property
+    @property
     def contact_forces(self) -> Mapping[str, FloatArray]:
         """Sum of the normal forces on each obstacle that is touched, or on a link by another one, shape (n,) [N]."""
         contacts = [equilibrium.contacts for equilibrium in self.equilibria]
@@ -102,6 +110,16 @@ class Trajectory:
         if self.link_moments is None:
             return None
         return max(float(equilibrium.link_limits.required_pressures.max()) for equilibrium in self.equilibria)
+
+    def least_margin(self, name: str) -> float | None:
+        """Return the least of the margins of a name in `LinkLimits` over all waypoints and links [-]; None without pressure."""
+        if self.link_moments is None or any(group.pressure == 0.0 for group in self.model.spring_groups):
+            return None
+        return known_margins(np.array([min(getattr(one.link_limits, name).min() for one in self.equilibria)]))[0]
+
+    def summary_parts(self) -> list[Part]:
+        """Return range and largest load of each motor, and the worst of all waypoints."""
+        return trajectory_parts(self)
 
     @property
     def wrinkling_margin(self) -> float | None:

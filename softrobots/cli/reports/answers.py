@@ -6,11 +6,13 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
+
+from softrobots.core.summary import aligned, formatted
 
 
 class Fact(NamedTuple):
@@ -49,16 +51,17 @@ def add_json(parser: argparse.ArgumentParser) -> None:
 
 
 def print_answer(
-    arguments: argparse.Namespace, answer: Mapping[str, Any], lines: Iterable[str], files: Sequence[Path] | None = None
+    arguments: argparse.Namespace, answer: Mapping[str, Any], lines: str | Iterable[str], files: Sequence[Path] | None = None
 ) -> None:
     """Print an answer: as JSON if `--json` is given, else as lines.
 
     Args:
         arguments: Arguments of a parser with `add_json`.
         answer: The answer for a machine; see `plain` for what it may hold.
-        lines: The same for a person.
+        lines: The same for a person, or a text of several lines.
         files: The files that were written, for a command that writes some: both forms end with them.
     """
+    lines = lines.split("\n") if isinstance(lines, str) else lines
     if files is not None:
         answer, lines = {**answer, "files": files}, [*lines, *written_lines(files)]
     if arguments.json:
@@ -88,34 +91,6 @@ def plain(value: Any) -> Any:
     return value
 
 
-def formatted(value: Any) -> str:
-    """Return numbers with six digits, truth values as yes or no, None as none, text as it is."""
-    value = plain(value)
-    if value is None:
-        return "none"
-    if isinstance(value, bool):
-        return "yes" if value else "no"
-    if isinstance(value, str):
-        return value
-    return "  ".join(f"{number:.6g}" for number in np.ravel(value) + 0.0)
-
-
 def written_lines(files: Sequence[Path]) -> list[str]:
     """Return the last lines of an answer: the files that were written, after an empty line; nothing without files."""
     return ["", *(f"{file}: written" for file in files)] if files else []
-
-
-def aligned(rows: Iterable[tuple[str, ...]], *, indent: str = "", right: Collection[int] = ()) -> list[str]:
-    """Return the lines of a table with aligned columns.
-
-    Args:
-        rows: Cells of each row.
-        indent: What stands before each line.
-        right: Numbers of the columns that are aligned at their right end, from 0.
-    """
-    kept = list(rows)
-    widths = [max(len(row[i]) for row in kept if i < len(row)) for i in range(max(map(len, kept), default=0))]
-    columns = [f"{'>' if i in right else '<'}{width}" for i, width in enumerate(widths)]
-    return [
-        (indent + "  ".join(f"{cell:{column}}" for cell, column in zip(row, columns, strict=False))).rstrip() for row in kept
-    ]
