@@ -55,6 +55,21 @@ def test_the_code_of_the_page_prints_what_it_says(name: str, tmp_path: Path) -> 
         assert np.abs(names["felt"] - (0.0, 10.0, -15.0)).max() < 1e-8  # from torques of an equilibrium settled to 1e-10
 
 
+@pytest.mark.system
+def test_every_task_of_the_first_page_runs_as_it_stands(tmp_path: Path) -> None:
+    """The lines of its table in their order, as one page; only measurements are made up here."""
+    table = page_text("docs/index.md").partition("## I want to ...")[2].partition("## Install")[0]
+    cells = [line.split(" | ")[1] for line in table.splitlines() if line.startswith("| ") and "`" in line]
+    lines = [re.findall(r"`([^`]+)`", cell) for cell in cells]
+    assert len(lines) >= 20
+    text = "```python\nimport softrobots as sr\nq = [(0.3, 0.6, -0.8), (0.1, 0.9, -0.5)]\nf = [(0, 0, -9), (0, 5, -6)]\n"
+    text += "tips = [sr.solve_equilibrium(sr.load_model(sr.InflatableArm()), *row).tip_position for row in zip(q, f)]\n"
+    text += "rows = sr.Measurements(q, force=f, tip_position=tips, std={'tip_position': 1e-3})\n```\n"
+    for line in [line for cell in lines for line in cell]:
+        text += f"\n```{'sh' if line.startswith('softrobots ') else 'python'}\n{line}\n```\n"
+    assert run_text(text, tmp_path).ran > len(lines)
+
+
 # --- The harness itself
 
 

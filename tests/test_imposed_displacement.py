@@ -112,6 +112,27 @@ def test_below_the_knee_it_is_load_control(limp: sr.SoftModel, way: float) -> No
     assert np.allclose(held.equilibrium.motor_torques, dead.motor_torques, rtol=0.0, atol=1e-7)
 
 
+def test_loads_beside_the_probe_stay(limp: sr.SoftModel) -> None:
+    """A force on the tip and a wrench on a link: with the reaction as one more dead force the springs are the same."""
+    motors, weight, push = (0.2, 0.3, -0.4), np.array([0.0, 2.0, -3.0]), np.array([0.0, 0.0, 1.0])
+    beside = {"link_1": (0.0, 0.0, -4.0, 0.0, 0.0, 0.0)}
+    held = sr.solve_imposed_displacement(limp, motors, 0.04, direction=push, force=weight, wrench=beside)
+    dead = sr.solve_equilibrium(limp, motors, weight + held.force, wrench=beside, tolerance=1e-12)
+    assert np.allclose(dead.q_springs, held.q_springs, rtol=0.0, atol=1e-9)
+    free = sr.solve_equilibrium(limp, motors, weight, wrench=beside)
+    assert (dead.tip_position - free.tip_position) @ push == pytest.approx(0.04, abs=1e-9)
+    with pytest.raises(sr.ParameterError, match="start"):
+        sr.solve_imposed_displacement(limp, motors, 0.05, direction=push, start=held)
+
+
+@pytest.mark.parametrize(("way", "pulls"), [(-0.05, True), (-1e-6, True), (0.0, False), (1e-6, False), (0.05, False)])
+def test_a_probe_that_pulls_says_so(limp: sr.SoftModel, way: float, pulls: bool) -> None:
+    """Where the springs are relaxed the reaction has the sign of the displacement."""
+    held = sr.solve_imposed_displacement(limp, (0, 0.5, 0), way, direction=(0, 0, -1), gravity=sr.EARTH_GRAVITY)
+    assert held.pulls is pulls
+    assert held.stable
+
+
 def test_the_displacement_counts_from_the_sagging_robot(limp: sr.SoftModel) -> None:
     still = sr.solve_imposed_displacement(limp, (0, 0.5, 0), 0.0, direction=(0, 0, 1), gravity=sr.EARTH_GRAVITY)
     free = sr.solve_equilibrium(limp, (0, 0.5, 0), gravity=sr.EARTH_GRAVITY)
@@ -263,6 +284,8 @@ def test_a_way_that_the_link_does_not_have_is_told(one: sr.SoftModel) -> None:
         ({"along": (0, 0, 0)}, "along.*different from zero"),
         ({"along": (0, 0, 1)}, "along.*does not run along the probe's line"),
         ({"gravity": (0, 0)}, "gravity"),
+        ({"force": (0, 0)}, "force"),
+        ({"wrench": (0, 0, 0)}, "wrench"),
         ({"q_motors": (0, 0, 0)}, "q_motors"),
         ({"tolerance": 0.0}, "tolerance"),
         ({"max_iterations": 0}, "max_iterations"),

@@ -51,6 +51,22 @@ def test_jacobian_is_that_of_equation_4(arm: sr.SoftModel, rng: np.random.Genera
         assert np.abs(found - flexible_jacobian(angles_of(motors, springs))[:, columns]).max() < ROUNDING
 
 
+@pytest.mark.parametrize("frame", [None, "link_1", "tip"])
+def test_the_jacobian_of_an_equilibrium_is_that_of_differences(arm: sr.SoftModel, frame: str | None) -> None:
+    """Central differences of 1e-6 rad of Pinocchio's placements: second derivatives cancel, rounding leaves 1e-10."""
+    held = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15), gravity=sr.EARTH_GRAVITY)
+    found, step = held.frame_jacobian(frame), 1e-6
+    rotation = frame_placement(arm, held.q, frame or "tip").rotation
+    for column in range(arm.pinocchio.nv):
+        turn = np.eye(arm.pinocchio.nv)[column] * step
+        before, after = (frame_placement(arm, held.q + sign * turn, frame or "tip") for sign in (-1.0, 1.0))
+        assert (after.translation - before.translation) / (2 * step) == pytest.approx(found[:3, column], abs=1e-9)
+        twist = (after.rotation - before.rotation) / (2 * step) @ rotation.T
+        assert np.array([twist[2, 1], twist[0, 2], twist[1, 0]]) == pytest.approx(found[3:, column], abs=1e-9)
+    with pytest.raises(sr.NameNotFound, match="elbow"):
+        held.frame_jacobian("elbow")
+
+
 def test_yourdfpy_places_every_link_where_pinocchio_does(arm: sr.SoftModel, rng: np.random.Generator) -> None:
     import yourdfpy
 

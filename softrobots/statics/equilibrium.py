@@ -39,10 +39,10 @@ def solve_equilibrium(
 ) -> Equilibrium:
     """Find the static equilibrium of the springs at given motor coordinates.
 
-    It is the one reached by energy descent from the relaxed springs, or from `q_springs0`; with a world-fixed moment, which
-    has no energy, the one reached by Newton from there, or while the load grows from zero, or while the moments grow from the
-    equilibrium without them. A descent ends in a stable equilibrium, or in a neutral one (a round robot that has buckled can
-    turn its bow about its axis); `Equilibrium.stability` tells which.
+    It is the one reached by energy descent from the relaxed springs, or from `q_springs0`. With a world-fixed moment there is
+    no energy. Tried in turn are then Newton's method from the start, a load that grows from zero, and moments that grow from
+    the equilibrium without them. A descent ends in a stable equilibrium, or in a neutral one (a round robot that has buckled
+    can turn its bow about its axis); `Equilibrium.stability` tells which.
 
     Args:
         model: The robot.

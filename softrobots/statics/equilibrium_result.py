@@ -19,7 +19,7 @@ from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.contact.contact import Contact, with_contacts
 from softrobots.statics.contact.touch import TOUCHING
 from softrobots.statics.equilibrium_summary import equilibrium_parts
-from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.stability import Stability, stability
 
@@ -30,7 +30,7 @@ _LENGTH_ROUNDING = np.array([-1e-12, 1e-12])  # [m], of muscle lengths that are 
 class Equilibrium(Summarised):
     """A solved static equilibrium; knows its model, load and motors, and can be saved with `softrobots.save_result`.
 
-    Torques are loads carried, minus what spring or motor exerts.
+    The sign of a torque is that of the load: the negative of the torque that the spring or motor exerts.
     """
 
     model: SoftModel
@@ -120,6 +120,17 @@ class Equilibrium(Summarised):
     def tip_position(self) -> FloatArray:
         """Position of the tip in the world, shape (3,) [m]."""
         return read_only(np.array(self.transform_tip_to_world.translation))
+
+    def frame_jacobian(self, frame: str | None = None) -> FloatArray:
+        """Geometric Jacobian of a frame, the tip by default: its velocity per velocity of each joint of `model.pinocchio`.
+
+        Shape (6, nv), linear rows first [m/rad; rad/rad], world axes, [Troise 2021] (4). How the loaded tip follows the motors
+        is `elastostatic_jacobian`.
+
+        Raises:
+            NameNotFound: If there is no such frame.
+        """
+        return frame_jacobian(self.model, self.q, self.model.tip if frame is None else frame)
 
     @cached_property
     def link_moments(self) -> FloatArray:

@@ -69,6 +69,11 @@ class ImposedDisplacement:
         return self.equilibrium.q_springs
 
     @property
+    def pulls(self) -> bool:
+        """Whether the reaction would have to pull at the robot, as nothing does that the robot only touches."""
+        return self.reaction * self.model.reach < -self.equilibrium.tolerance
+
+    @property
     def residual(self) -> float:
         """Norm of the out-of-balance torque [N m]."""
         return self.equilibrium.residual
@@ -88,6 +93,8 @@ def solve_imposed_displacement(
     frame: str | None = None,
     point: Any = (0.0, 0.0, 0.0),
     along: Any = None,
+    force: Any = None,
+    wrench: Any = None,
     gravity: Any = None,
     start: ImposedDisplacement | None = None,
     tolerance: float = TOLERANCE,
@@ -96,7 +103,9 @@ def solve_imposed_displacement(
     """Find the springs and the reaction of a frictionless probe that displaces a point of the robot by a given distance.
 
     The displacement is counted from the equilibrium without the probe. It is imposed at once, or in steps where Newton does not
-    converge: the result is on the path from that equilibrium, or from `start`.
+    converge: the result is on the path from that equilibrium, or from `start`. The probe holds the point from both sides, so
+    the reaction can pull (`ImposedDisplacement.pulls`). A wall that only pushes, and that the robot touches wherever it gets
+    there, is an obstacle: `solve_equilibrium(..., environment=Environment([HalfSpace(...)]))`.
 
     Args:
         model: The robot, with at least one spring.
@@ -108,6 +117,8 @@ def solve_imposed_displacement(
         along: Axis of the frame, shape (3,), any length but zero, along which the probe slides on the robot: on the face that
             contains this axis and, without the probe, faces the line most. None: the probe stays at its point, which is free
             to move across the line.
+        force: Force on the tip beside that of the probe, shape (3,) [N], world axes.
+        wrench: Wrenches on the robot beside that of the probe, as in `solve_equilibrium`, at the tip or by frame.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
         start: A solution with the same model, motors, probe and load to start from, e.g. the last one of a sequence.
         tolerance: Largest residual, relative to `max(|f| reach + |g|, 1e-3 N m)`.
@@ -131,8 +142,9 @@ def solve_imposed_displacement(
     touched = finite_array("point", point, (3,), "m")
     axis = None if along is None else unit_vector("along", along)
     most = positive_integer("max_iterations", max_iterations)
-    free = solve_equilibrium(model, motors, frame=frame, gravity=gravity, tolerance=tolerance)
     at = model.tip if frame is None else frame
+    model.frame_id(at)
+    free = solve_equilibrium(model, motors, force, wrench=wrench, gravity=gravity, tolerance=tolerance)
     pose = frame_placement(model, free.q, at)
     origin = pose.translation + pose.rotation @ touched
     normal = None if axis is None else read_only(face_normal(pose.rotation.T @ line, axis, along))
