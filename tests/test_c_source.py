@@ -20,9 +20,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.compiled.c.source import to_c
 from softrobots.compiled.drivers import intrinsics, trigonometry
 from softrobots.compiled.program.generated_module import functions_of
+from softrobots.compiled.translate.c import to_c
 from tests.conftest import missing
 from tests.support.c_libraries import build_library
 from tests.support.tables import each_row

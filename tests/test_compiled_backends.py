@@ -18,13 +18,13 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.compiled.c.kernel_language import read_module
-from softrobots.compiled.c.source import to_c
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import Program, make_program
 from softrobots.compiled.run import backends
 from softrobots.compiled.run.backends import NumbaRun, PythonRun, available_backend, cache_folder, make_run
 from softrobots.compiled.run.batches import solve_batch
+from softrobots.compiled.translate.c import to_c
+from softrobots.compiled.translate.kernel_language import read_module
 from softrobots.model.soft_model import SoftModel
 from tests.support.serial_chains import ROBOTS
 from tests.support.tables import each_row

@@ -15,7 +15,6 @@ import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
-from softrobots.compiled.c.kernel_language import read_module
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import (
     Expression,
@@ -31,6 +30,7 @@ from softrobots.compiled.trace.expressions import (
     smaller,
     square_root,
 )
+from softrobots.compiled.translate.kernel_language import read_module
 from tests.support.traced import MANY_DIGITS, functions, operations, values
 
 INPUTS = 4

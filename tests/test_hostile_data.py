@@ -775,7 +775,7 @@ DOORWAYS = {
     "cli.doctor": "compares a file with what is generated, byte for byte",
     "studies.shared.recorded_run": "a page of the checkout",
     "studies.mutation.mutants": "what the tool has just written",
-    "compiled.c.intrinsics": "a file of ours in C",
+    "compiled.translate.c": "a file of ours in C",
     "compiled.run.backends": "compares a file with what is generated, byte for byte",
     "export.python_text": "a template of ours",
     "studies.shared.machine": "a file of the kernel",

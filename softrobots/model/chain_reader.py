@@ -168,7 +168,7 @@ def _elements(model: Any, path: list[int], structure: Structure) -> tuple[tuple[
             slides, axes = _axes(model, number, neutral)
             places = motors.get(joint), strains.get(joint)
             body = _body(model.inertias[number], axes)
-            elements.append(ChainJoint(joint, _snapped(rotation @ axes), translation, slides, *places, body))
+            elements.append(ChainJoint(joint, _snapped(rotation @ axes), translation, slides, *places, body, read_only(axes)))
     return tuple(elements), axes
 
 

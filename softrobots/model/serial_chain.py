@@ -46,6 +46,8 @@ class ChainJoint:
     """Its place among the strains (see `SerialChain.stiffness`); None for a motor."""
     body: ChainBody
     """The mass fixed to its frame."""
+    axes: FloatArray
+    """Axes of its frame in Pinocchio's frame of the joint, shape (3, 3)."""
 
 
 @dataclass(frozen=True, eq=False)

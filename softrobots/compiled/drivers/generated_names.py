@@ -92,6 +92,23 @@ VELOCITY: int
 WEIGHTS: int
 WHOLE_STEP: int
 
+# Shape of the robot, see `softrobots.compiled.program.shape_program`.
+ELASTIC_ROW: tuple[int, ...]
+ELASTIC_SHARE: tuple[float, ...]
+ELASTIC_STRAIN: tuple[int, ...]
+N_ELASTIC: int
+N_PLACED: int
+N_POINTS: int
+N_SPRINGS: int
+N_STRAINS: int
+PLACED_COORDINATE: tuple[int, ...]
+PLACED_KIND: tuple[int, ...]
+PLACEMENTS: int
+SPRINGS: int
+STRAINS: int
+STRAIN_REST: tuple[float, ...]
+UNKNOWN_STRAIN: tuple[int, ...]
+
 # Numbers of the robot: spring rounding [N m], reach [m], tables by unknown, motor or muscle.
 GROUP: tuple[int, ...]
 LEAST_INPUT: tuple[float, ...]
@@ -122,6 +139,11 @@ prepare_force: Callable[[Array], None]
 respond_lanes: Callable[[Array], None]
 target_pass_lanes: Callable[[Array], None]
 target_step: Callable[[Array], None]
+
+# Straight-line functions of the shape: place to write, row of the table, placement before, coordinate, number of the point.
+place_section: Callable[[Array, int, int, int, int, int], None]
+place_slide: Callable[[Array, int, int, int, int, int], None]
+place_turn: Callable[[Array, int, int, int, int, int], None]
 
 # Straight-line functions of motion.
 apply_correction: Callable[[Array, int], None]

@@ -109,14 +109,14 @@ def module_text(
     """Return the text of a module: docstring, constants, straight-line functions, loops over elements, drivers."""
     docstring = docstring.replace("\\", "\\\\").replace('"""', r"\"\"\"")  # a name could end the text
     head = "\n".join(f"{name} = {value!r}" for name, value in values.items())
-    straight = [*map(_text, functions_of(trigonometry)), *(block.text() for block in blocks)]
-    return "\n\n\n".join([f'"""{docstring}\n"""\n\n{head}', *straight, *loops, *map(_text, functions)]) + "\n"
+    straight = [*map(text_of, functions_of(trigonometry)), *(block.text() for block in blocks)]
+    return "\n\n\n".join([f'"""{docstring}\n"""\n\n{head}', *straight, *loops, *map(text_of, functions)]) + "\n"
 
 
 def lane_text(blocks: Sequence[Block], loops: Sequence[str], functions: Sequence[Callable[..., Any]]) -> str:
     """Return the text that is appended for batches: straight-line functions of lanes, loops over elements, drivers."""
     straight = [replace(block, name=f"{block.name}_lanes").text(lanes=True) for block in blocks]
-    return "\n\n\n".join([*straight, *loops, *map(_text, functions)]) + "\n"
+    return "\n\n\n".join([*straight, *loops, *map(text_of, functions)]) + "\n"
 
 
 def lane_count(size: int) -> int:
@@ -181,6 +181,6 @@ def functions_of(module: ModuleType) -> list[Callable[..., Any]]:
 
 
 @cache
-def _text(function: Callable[..., Any]) -> str:
+def text_of(function: Callable[..., Any]) -> str:
     """Return the text of a function of the drivers."""
     return inspect.getsource(function).rstrip()

@@ -15,7 +15,7 @@ from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel
 
@@ -98,12 +98,40 @@ class CompiledStatics:
             ParameterError: If the prefix is not an identifier of C, the robot cannot have poses as targets, or motion is asked
                 for and that of its actuators is not compiled.
         """
-        from softrobots.compiled.c.source import to_c
+        from softrobots.compiled.translate.c import to_c
 
         if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
             raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
         program = make_motion_program(self._unknowns) if motion else self._run(gravity, poses).program
         return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
+
+    def js_source(self, *, gravity: bool = True, points: int = 4) -> str:
+        """Return a solver for a page, in JavaScript: one script without imports, that defines the function `makeSolver`.
+
+        `makeSolver()` returns an object with
+
+        - `name`; `actuators`, each `{name, unit, lower, upper, relaxed}` (a limit that is not there is null); `springs`, each
+          `{name, unit}`; `statuses`, by number `{name, text}`; `frames`, each `{name, kind, share}`;
+        - `solve({motors, force, gravity, from})`. Motors [rad, m, N or Pa] are an array or an object by name. Force [N] and
+          gravity [m/s^2], world axes, may be left out: none. `from` is an earlier result near which the search starts.
+
+        The result of `solve` has `status` and `statusText` (see `Status`), `tip` [m], `springs` (as `Equilibrium.q_springs`),
+        `residual` [N m], `minPivot` (the smallest pivot of the tangent stiffness, by its spring's own) and `placements`: for
+        each of `frames` a rotation matrix, row by row, and a position [m] in the world. Frames are those of joints,
+        Pinocchio's, of points along sections at a share of their length, and the tip. Other numbers than finite ones throw a
+        TypeError. With the status `NOT_A_NUMBER` all that was not found is zero or NaN.
+
+        Args:
+            gravity: Write the code for robots with weight; it solves weightless ones, too.
+            points: Number of placements along a section.
+
+        Raises:
+            ParameterError: If `points` is not positive.
+        """
+        from softrobots.compiled.browser.script import script
+
+        positive_integer("points", points, 1000)
+        return script(self._model, self._unknowns, self._run(gravity).program, gravity=gravity, points=points)
 
     def equilibrium(
         self, q_motors: Any, force: Any = NO_FORCE, *, gravity: Any = None, q_springs0: Any = None

@@ -1,7 +1,7 @@
-"""Functions of the kernel language in C: statements, declarations and the order of evaluation.
+"""Translated functions of the kernel language: statements, declarations and the order of evaluation.
 
-Python has one scope in a function, C one in each block: a local is declared with its first assignment if that stands in the
-function's own block, else at the top, as zero.
+Python has one scope in a function, C and JavaScript have one in each block: a local is declared with its first assignment if
+that stands in the function's own block, else at the top, as zero.
 """
 
 from __future__ import annotations
@@ -11,25 +11,10 @@ import re
 from collections import Counter
 from collections.abc import Sequence
 
-from softrobots.compiled.c.expressions import Part, Scope
-from softrobots.compiled.c.kernel_language import WORDS, Function, Parameter
-from softrobots.compiled.c.lines import INDENT, comment, wrapped
-
-C_TYPES = {"none": "void", "int": "int", "bool": "int", "float": "double"}
-"""Types in C."""
-_RESERVED = """
-auto break case char const continue default do double else enum extern float for goto if inline int long register restrict
-return short signed sizeof static struct switch typedef union unsigned void volatile while asm typeof linux unix
-""".split()  # noqa: SIM905 (readable)
-
-
-def prototype(function: Function, prefix: str) -> str:
-    """Return the declaration of a function, without the semicolon."""
-    shown = []
-    for parameter in function.parameters:
-        array = f"{'' if parameter.written else 'const '}double *{parameter.name}"
-        shown.append(array if parameter.kind == "array" else f"{C_TYPES[parameter.kind]} {parameter.name}")
-    return f"{C_TYPES[function.returns]} {prefix}{function.name}({', '.join(shown) or 'void'})"
+from softrobots.compiled.translate.dialect import Part
+from softrobots.compiled.translate.expressions import Scope
+from softrobots.compiled.translate.kernel_language import WORDS, Function, Parameter
+from softrobots.compiled.translate.lines import INDENT, comment
 
 
 class FunctionWriter:
@@ -37,7 +22,7 @@ class FunctionWriter:
 
     def __init__(self, function: Function, scope: Scope) -> None:
         """Prepare to write `function`; `scope` is that of the module, with all that is defined before the function."""
-        self.function, self.scope, self._module = function, scope, scope.module
+        self.function, self.scope, self._module, self._dialect = function, scope, scope.module, scope.dialect
         self._at_top: list[str] = []  # locals to declare there
         self._lines: list[str] = []
         self._bounds = 0  # of loops, so far
@@ -51,7 +36,7 @@ class FunctionWriter:
         scope.kinds.update({parameter.name: parameter.kind for parameter in function.parameters})
 
     def text(self, *, external: bool) -> str:
-        """Return the function in C; `external`: it can be called from other files.
+        """Return the translated function; `external`: it can be called from other files.
 
         Raises:
             ParameterError: If a statement is outside the kernel language.
@@ -61,22 +46,23 @@ class FunctionWriter:
         if function.returns != "none" and not _ends(function.body):
             self._module.refuse(function.node, f"{function.name} returns a value on every way through it")
         lines = comment(function.docstring.splitlines()).splitlines() if function.docstring else []
-        head = ("" if external else "static ") + prototype(function, self.scope.prefix)
         declared = [
-            f"{INDENT}{C_TYPES[kinds[name]]} {name} = {'0.0' if kinds[name] == 'float' else '0'};" for name in self._at_top
+            f"{INDENT}{self._dialect.declaration(kinds[name])}{name} = {'0.0' if kinds[name] == 'float' else '0'};"
+            for name in self._at_top
         ]
         local = [*(parameter.name for parameter in function.parameters), *self._at_top]
-        unused = [f"{INDENT}(void){name};" for name in local if name not in self._read]
-        body = [short for line in (head, "{", *declared, *unused, *self._lines, "}") for short in wrapped(line)]
-        return "\n".join([*lines, *body])
+        unused = [INDENT + line for line in self._dialect.unused([name for name in local if name not in self._read])]
+        text = (self._dialect.head(function, external=external), "{", *declared, *unused, *self._lines, "}")
+        return "\n".join([*lines, *(short for line in text for short in self._dialect.lines(line))])
 
     def _check_name(self, name: str) -> None:
-        taken = name in (*WORDS, *_RESERVED, *self._module.constants, *self._module.functions)
-        if taken or not name.isascii() or re.match(rf"_[_A-Z]|stop_|{self.scope.prefix}", name):
+        prefix = self._dialect.prefix
+        taken = name in (*WORDS, *self._dialect.reserved, *self._module.constants, *self._module.functions)
+        if taken or not name.isascii() or re.match(rf"_[_A-Z]|stop_|{re.escape(prefix)}", name):
             self._module.refuse(
                 self.function.node,
-                "a parameter or local has an ASCII name that is no keyword of C, no word of the language, no other name of the "
-                f"module, and does not begin with _A, __, stop_ or {self.scope.prefix}; {name} does not fit",
+                "a parameter or local has an ASCII name that is no keyword, no word of the language, no other name of the "
+                f"module, and does not begin with _A, __, stop_ or {prefix}; {name} does not fit",
             )
 
     def _check_loops(self, parameters: Sequence[str]) -> None:
@@ -110,7 +96,7 @@ class FunctionWriter:
             case ast.Expr(value=ast.Call() as called):
                 self._ordered(node)
                 part = self.scope.call(called)
-                self._lines.append(f"{indent}{'' if part.kind == 'none' else '(void)'}{part.text};")
+                self._lines.append(f"{indent}{part.text if part.kind == 'none' else self._dialect.ignored(part.text)};")
             case ast.Assign(targets=[ast.Name() | ast.Subscript() as target], value=value):
                 self._ordered(node)
                 self._assign(node, target, self.scope.value(value), indent)
@@ -160,7 +146,7 @@ class FunctionWriter:
         if name not in self.scope.kinds:
             self.scope.kinds[name] = part.kind
             if indent == INDENT and name in self._read:
-                declaration = f"{'const ' if self._stored[name] == 1 else ''}{C_TYPES[part.kind]} "
+                declaration = self._dialect.declaration(part.kind, constant=self._stored[name] == 1)
             else:
                 self._at_top.append(name)
         self._lines.append(f"{indent}{declaration}{name} = {fitting.text};")
@@ -189,9 +175,11 @@ class FunctionWriter:
         if self.scope.known_int(limits[-1]) is None:  # Python looks at it once
             self._bounds += 1
             bound = f"stop_{self._bounds}"
-            self._lines.append(f"{indent}const int {bound} = {parts[-1].text};")
+            self._lines.append(f"{indent}{self._dialect.declaration('int', constant=True)}{bound} = {parts[-1].text};")
         self.scope.kinds[name] = "int"
-        self._lines.append(f"{indent}for (int {name} = {start}; {name} < {bound}; {name} += 1) {{")
+        self._lines.append(
+            f"{indent}for ({self._dialect.declaration('int')}{name} = {start}; {name} < {bound}; {name} += 1) {{"
+        )
         self._block(node.body, indent + INDENT)
         self._lines.append(f"{indent}}}")
 

@@ -1,4 +1,4 @@
-"""Expressions of the kernel language in C, with their types; every compound operand stands in parentheses."""
+"""Translated expressions of the kernel language, with their types; every compound operand stands in parentheses."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import ast
 import operator
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import NamedTuple
 
-from softrobots.compiled.c.kernel_language import INTRINSICS, Function, Module
+from softrobots.compiled.translate.dialect import Dialect, Part, bare
+from softrobots.compiled.translate.kernel_language import INTRINSICS, Function, Module
 
 _ARITHMETIC: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _ON_KNOWN: dict[type[ast.operator], Callable[[int, int], int]] = {
@@ -26,25 +26,6 @@ _COMPARISONS: dict[type[ast.cmpop], str] = {
 }
 
 
-class Part(NamedTuple):
-    """An expression in C."""
-
-    text: str
-    """Its text."""
-    kind: str
-    """`int`, `float`, `bool` or `none`."""
-    operator: str = ""
-    """Its outermost operator; empty for names, literals, elements and calls."""
-
-    def operand(self, chained: str = "") -> str:
-        """Return its text as an operand, bare if it is a chain of the operator `chained` or has no operator."""
-        return self.text if self.operator in ("", chained) else f"({self.text})"
-
-    def as_float(self) -> Part:
-        """Return it where C wants a double: an int literal as a float literal; C converts other ints by itself."""
-        return Part(f"{self.text}.0", "float") if self.text.isdigit() else self
-
-
 @dataclass
 class Scope:
     """Names known at some place of a function, and the names of the module that the function has used so far."""
@@ -53,17 +34,17 @@ class Scope:
     """The module."""
     earlier: dict[str, Function]
     """Functions that are defined before this one."""
-    prefix: str
-    """Prefix of the names at the level of the file."""
+    dialect: Dialect
+    """The language that it is translated to."""
     kinds: dict[str, str] = field(default_factory=dict)
     """Types of parameters and locals so far: `int`, `float`, `bool` or `array`."""
     needs: set[str] = field(default_factory=set)
     """Functions, constants and intrinsics that the function uses."""
 
     def global_name(self, name: str) -> str:
-        """Return the name in C of something at the level of the file, and note that it is needed."""
+        """Return the translated name of something at the level of the file, and note that it is needed."""
         self.needs.add(name)
-        return self.prefix + name
+        return self.dialect.prefix + name
 
     def value(self, node: ast.expr) -> Part:
         """Translate an expression that has a value.
@@ -76,7 +57,7 @@ class Scope:
             return Part(repr(literal), type(literal).__name__)
         match node:
             case ast.Constant(value=bool() as truth):
-                return Part(str(int(truth)), "bool")
+                return Part(self.dialect.truth(truth), "bool")
             case ast.Name(id=name):
                 return self._name(node, name)
             case ast.Subscript():
@@ -89,8 +70,7 @@ class Scope:
             case ast.BinOp(left=left, op=operation, right=right):
                 return self.arithmetic(node, self.value(left), operation, self.value(right))
             case ast.UnaryOp(op=ast.USub(), operand=operand):
-                negated = self._number(operand)
-                return Part(f"-{negated.operand()}", negated.kind, "negation")
+                return self.dialect.negated(self._number(operand))
             case ast.UnaryOp(op=ast.Not(), operand=operand):
                 return Part(f"!{self.condition(operand).operand()}", "bool", "!")
             case ast.Compare(left=left, ops=[comparison], comparators=[right]) if type(comparison) in _COMPARISONS:
@@ -121,12 +101,9 @@ class Scope:
         if type(operation) not in _ARITHMETIC:
             self.module.refuse(node, "operations on numbers are + - * /")
         sign = _ARITHMETIC[type(operation)]
-        ints = left.kind == right.kind == "int"
-        if ints and sign == "/":
-            ints, left = False, Part(f"(double){left.operand()}", "float", "cast")
-        if not ints:
-            left, right = left.as_float(), right.as_float()
-        return Part(f"{left.operand(sign)} {sign} {right.operand()}", "int" if ints else "float", sign)
+        if left.kind == right.kind == "int":
+            return self.dialect.arithmetic(left, sign, right)
+        return bare(left.as_float(), sign, right.as_float())
 
     def element(self, node: ast.Subscript, *, store: bool = False) -> Part:
         """Translate an element of an array or a table."""
@@ -159,7 +136,14 @@ class Scope:
         if len(node.args) != len(kinds) or any(isinstance(argument, ast.Starred) for argument in node.args):
             self.module.refuse(node, f"{name} takes {len(kinds)} argument{'' if len(kinds) == 1 else 's'}")
         shown = [self._argument(argument, kind, name) for argument, kind in zip(node.args, kinds, strict=True)]
-        return Part(f"{self.global_name(name)}({', '.join(shown)})", "float" if function is None else function.returns)
+        if function is None:
+            called = (getattr(one.func, "id", "") for one in ast.walk(node) if isinstance(one, ast.Call))
+            inside = [parameter for one in called if one in self.earlier for parameter in self.earlier[one].parameters]
+            if any(parameter.written for parameter in inside):
+                self.module.refuse(node, f"a call that writes an array stands outside of {name}")
+            self.needs.add(name)
+            return self.dialect.intrinsic(name, shown)
+        return Part(f"{self.global_name(name)}({', '.join(shown)})", function.returns)
 
     def fitting(self, node: ast.AST, part: Part, kind: str, name: str) -> Part:
         """Return the part as a value of type `kind`, for `name`.

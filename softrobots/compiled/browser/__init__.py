@@ -1,0 +1,1 @@
+"""Equilibria in a page: a generated module as one script in JavaScript."""

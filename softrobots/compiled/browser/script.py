@@ -1,0 +1,78 @@
+"""The script of a robot: the kernel in JavaScript, what it is to know of the robot, and `solver.js`."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import numpy as np
+
+from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.program.generated_module import Program
+from softrobots.compiled.program.shape_program import with_shape
+from softrobots.compiled.statuses import Status
+from softrobots.compiled.translate.javascript import to_javascript
+from softrobots.compiled.translate.lines import comment
+from softrobots.constant_curvature.strain_chain import STRAINS
+from softrobots.model.serial_chain import ChainSection, SerialChain, strains_of
+from softrobots.model.soft_model import SoftModel
+
+
+def script(model: SoftModel, unknowns: Unknowns, program: Program, *, gravity: bool, points: int) -> str:
+    """Return the script; see `CompiledStatics.js_source`."""
+    layout, muscles = program.layout, len(unknowns.chain.muscle_paths.rest)
+    shape = with_shape(program, unknowns, points)
+    names = ("settle", "settle_from", "evaluate", "look_at_shape", "FORCE", "UNKNOWN", "START", "TIP", "ERROR", "MIN_PIVOT")
+    kernel = to_javascript(shape.text, exported=(*names, *(["put_muscles"] if muscles else [])))
+    low, high = model.motor_limits.T
+    relaxed = model.relaxed_motors
+    rows = zip(model.actuators.names, model.actuators.units, low.tolist(), high.tolist(), relaxed.tolist(), strict=True)
+    robot = {
+        "name": unknowns.chain.name,
+        "size": shape.size,
+        "joints": layout.motors,
+        "muscles": muscles,
+        "unknowns": layout.unknowns,
+        "started": unknowns.n_constraints > 0,
+        "gravity": gravity,
+        "gravityPlace": layout.gravity,
+        "springsPlace": shape.springs,
+        "placementsPlace": shape.placements,
+        "actuators": [
+            {"name": name, "unit": unit, "lower": _finite(lower), "upper": _finite(upper), "relaxed": rest}
+            for name, unit, lower, upper, rest in rows
+        ],
+        "springs": [{"name": name, "unit": unit} for name, unit in _springs(unknowns.chain)],
+        "statuses": [{"name": status.name, "text": status.explanation} for status in Status],
+        "frames": shape.frames,
+    }
+    pieces = [
+        comment([f"Equilibria of {unknowns.chain.name}, written by softrobots: makeSolver() returns a solver."]),
+        'var makeSolver = (() => {\n"use strict";',
+        kernel,
+        f"const ROBOT = {json.dumps(robot, allow_nan=False)};",
+        Path(__file__).with_name("solver.js").read_text(encoding="utf-8"),
+        "return makeSolver;\n})();\n",
+    ]
+    return "\n\n".join(pieces).replace("</", "<\\/").replace("<!--", "<\\!--")  # a page can hold it as it is
+
+
+def _springs(chain: SerialChain) -> list[tuple[str, str]]:
+    """Return name and unit of each elastic coordinate; that of several strains is named by the first of them."""
+    strains: dict[int, tuple[str, str]] = {}
+    for element in chain.elements:
+        if isinstance(element, ChainSection):
+            units = (*["rad"] * 3, "m")
+            own = [(f"{element.name} {strain}", unit) for strain, unit in zip(STRAINS, units, strict=True)]
+            strains |= dict(zip(strains_of(element), own, strict=True))
+        elif element.strain is not None:
+            strains[element.strain] = element.name, "m" if element.slides else "rad"
+    found = []
+    for row in chain.elastic:
+        name, unit = strains[int(np.flatnonzero(row)[0])]
+        found.append((name if np.count_nonzero(row) == 1 else f"{name} and others", unit))
+    return found
+
+
+def _finite(limit: float) -> float | None:
+    return limit if abs(limit) < 1e300 else None

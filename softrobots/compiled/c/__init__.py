@@ -1,1 +1,0 @@
-"""Translation of generated modules from the kernel language, a subset of Python, to freestanding C99."""

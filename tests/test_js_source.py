@@ -1,0 +1,224 @@
+"""The kernel language in JavaScript, and the script of a robot: its text, and what it computes in Chromium."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterator
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pinocchio as pin
+import pytest
+
+import softrobots as sr
+from softrobots.compiled.drivers import intrinsics
+from softrobots.compiled.statuses import Status
+from softrobots.compiled.translate.javascript import to_javascript
+from softrobots.view.browser import open_browser
+from tests.support.laws import law
+
+ROBOTS: dict[str, tuple[Any, float, float]] = {
+    "arm": (sr.InflatableArm(), 5.0, 1.0),
+    "arm with wrist": (sr.InflatableArm(wrist=(0.08, 0.12)), 5.0, 1.0),
+    "slack wall": (sr.InflatableArm(moment_law="slack_wall"), 5.0, 1.0),
+    "PCC, lengths": (sr.PccArm(), 0.5, 0.3),
+    "PCC, tensions": (sr.PccArm(kind="tension"), 0.5, 0.1),
+    "PCC, lumped": (sr.PccArm(chain="lumped"), 0.5, 0.3),
+    "tendons": (sr.TendonArm(), 0.05, 0.3),
+    "helix": (sr.HelixTube(), 0.1, 0.3),
+}
+"""Robots, size of the forces on their tips [N], and how far actuators go from relaxed to anywhere within their limits [-].
+
+Residuals are relative to the tensions, too: under the largest ones 1e-10 of them moves a tip by 2 nm."""
+KERNEL = '''"""Text."""
+
+N = 2
+SHIFT = -0.5
+TABLE = (1.0, 2.5)
+PLACES = (1, 0)
+UNUSED = 3.0
+
+def add(w: Array, x: float) -> int:
+    """Write; </script> ends nothing."""
+    w[0] += x
+    return 1
+
+def settle(w: Array, flag: int) -> bool:
+    k = -flag * 2
+    ready = False
+    for i in range(N + flag):
+        y = floor(w[PLACES[i]] / 3) + where(w[i] < SHIFT and not ready, TABLE[i], -i)
+        w[i] = fabs(y) * sqrt(w[i])
+    add(w, 1)
+    if k / 2 == 1:
+        return True
+    return k > 0
+'''
+TRANSLATED = """\
+const $N = 2;
+const $SHIFT = -0.5;
+const $TABLE = Float64Array.of(1.0, 2.5);
+const $PLACES = Int32Array.of(1, 0);
+
+/* Write; </script> ends nothing. */
+function $add(w, x)
+{
+    w[0] = w[0] + x;
+    return 1;
+}
+
+function $settle(w, flag)
+{
+    let y = 0.0;
+    const k = Math.imul(0 - flag, 2);
+    const ready = false;
+    const stop_1 = $N + flag;
+    for (let i = 0; i < stop_1; i += 1) {
+        y = (Math.floor(w[$PLACES[i]] / 3.0) + 0.0) + ((w[i] < $SHIFT) && (!ready) ? $TABLE[i] : 0 - i);
+        w[i] = Math.abs(y) * Math.sqrt(w[i]);
+    }
+    $add(w, 1.0);
+    if ((k / 2) == 1.0) {
+        return true;
+    }
+    return k > 0;
+}
+"""
+
+
+@cache
+def compiled(name: str) -> sr.CompiledModel:
+    return sr.compile(sr.load_model(ROBOTS[name][0]), backend="python")
+
+
+@cache
+def script(name: str) -> str:
+    return compiled(name).js_source()
+
+
+def test_dialect() -> None:
+    """Declarations, ints that are never minus zero, intrinsics; what is not used is left out."""
+    assert to_javascript(KERNEL, exported=("settle",)) == TRANSLATED
+
+
+@pytest.mark.parametrize(
+    ("text", "word"),
+    [
+        ("def f(w: Array, arguments: int) -> None:\n    w[0] = arguments\n", "keyword"),
+        (
+            "def g(w: Array) -> float:\n    w[0] = 1.0\n    return 1.0\n"
+            "def f(w: Array) -> None:\n    x = where(True, g(w), 2.0)\n",
+            "outside of where",
+        ),
+    ],
+)
+def test_refusals(text: str, word: str) -> None:
+    """Names that JavaScript keeps; a choice whose sides write, both of which Python computes and JavaScript does not."""
+    with pytest.raises(sr.ParameterError, match=word):
+        to_javascript(text, exported=("f",))
+
+
+@law("CompiledModel.js_source")
+@pytest.mark.parametrize("name", ["arm", "helix"])
+def test_script_is_self_contained(name: str) -> None:
+    """Every name of the kernel that the text uses is declared in it once; nothing is imported, and no tag of a page ends it."""
+    text = script(name)
+    used = set(re.findall(r"\$(\w+)", text)) - (set() if compiled(name).model.muscles else {"put_muscles"})
+    declared = re.findall(r"^(?:const|function) \$(\w+)", text, re.MULTILINE)
+    assert sorted(declared) == sorted(used)
+    assert not re.search(r"\bimport\b|\brequire\b|\bfetch\b|</|<!--", text)
+    assert text.count("makeSolver = ") == 1
+    assert repr(float(compiled(name).model.chain().stiffness[-1])) in text
+    assert text == compiled(name).js_source(gravity=True, points=4)
+    with pytest.raises(sr.ParameterError, match="points"):
+        compiled(name).js_source(points=0)
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Any]:
+    with open_browser() as opened:
+        yield opened
+
+
+def random_cases(name: str, count: int) -> list[dict[str, Any]]:
+    """Draw actuators, forces, and weight in every other case."""
+    model, (_, size, share) = compiled(name).model, ROBOTS[name]
+    random, relaxed = np.random.default_rng(3), model.relaxed_motors
+    cases = []
+    while len(cases) < count:
+        drawn = model.actuators.draw(random)
+        if drawn is not None:
+            motors = relaxed + share * (drawn - relaxed)
+            down = [0.0, 0.0, -9.81 if len(cases) % 2 else 0.0]
+            cases.append({"motors": motors.tolist(), "force": (size * random.normal(size=3)).tolist(), "gravity": down})
+    return cases
+
+
+def in_browser(browser: Any, name: str, code: str, argument: Any = None, **options: Any) -> Any:
+    """Return what a function of JavaScript returns in a page where `solver` solves a robot."""
+    page = browser.new_page()
+    page.add_script_tag(content=script(name) if not options else compiled(name).js_source(**options))
+    page.evaluate("() => { window.solver = makeSolver(); }")
+    value = page.evaluate(code, argument)
+    page.close()
+    return value
+
+
+SOLVE = """cases => cases.map((one) => { const found = solver.solve(one);
+  for (const name of ["springs", "placements", "unknowns", "start"]) found[name] = Array.from(found[name]);
+  return found; })"""
+
+
+def plain_kernel(name: str) -> dict[str, Any]:
+    """The generated code, as Python runs it, with its own sines."""
+    names: dict[str, Any] = {key: getattr(intrinsics, key) for key in ("Array", "where", "floor", "fabs", "sqrt")}
+    exec(compiled(name).source(gravity=True), names)
+    return names
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("name", ROBOTS)
+def test_answers_are_those_of_python(browser: Any, name: str) -> None:
+    """Springs and tip of random cases are those of `solve_equilibrium`; status and unknowns those of the same code in Python.
+
+    The first to 1e-9: both leave 1e-10 of the load out of balance at most; the second to the last bit.
+    """
+    cases, model, kernel = random_cases(name, 50), compiled(name).model, plain_kernel(name)
+    place = kernel["UNKNOWN"]
+    joints, certified = kernel["N_MOTORS"], 0
+    for case, found in zip(cases, in_browser(browser, name, SOLVE, cases), strict=True):
+        w = [0.0] * kernel["WORKSPACE_SIZE"]
+        w[:joints] = case["motors"][:joints]
+        if "put_muscles" in kernel:
+            kernel["put_muscles"](w, case["motors"][joints:])
+        w[kernel["FORCE"] : kernel["FORCE"] + 3], w[kernel["GRAVITY"] : kernel["GRAVITY"] + 3] = case["force"], case["gravity"]
+        status = kernel["settle"](w)
+        assert found["status"] == status
+        assert found["unknowns"] == w[place : place + len(found["unknowns"])]
+        assert found["statusText"] == Status(status).explanation
+        if status == Status.CERTIFIED:
+            certified += 1
+            one = sr.solve_equilibrium(model, case["motors"], case["force"], gravity=case["gravity"])
+            assert np.abs(one.q_springs - found["springs"]).max() < 1e-9
+            assert np.abs(one.tip_position - found["tip"]).max() < 1e-9
+    assert certified > 40
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("name", ["arm with wrist", "PCC, lengths", "helix"])
+def test_placements_are_those_of_pinocchio(browser: Any, name: str) -> None:
+    """Frames of joints and of ends of sections, by forward kinematics at the same coordinates, to rounding."""
+    cases, model = random_cases(name, 4), compiled(name).model
+    frames = in_browser(browser, name, "() => solver.frames")
+    for case, found in zip(cases, in_browser(browser, name, SOLVE, cases), strict=True):
+        data = model.pinocchio.createData()
+        pin.forwardKinematics(model.pinocchio, data, model.configuration(case["motors"], found["springs"]))
+        ends = list(data.oMi)  # the last joint of each section is its end
+        rows = np.reshape(found["placements"], (-1, 12))
+        assert len(rows) == len(frames)
+        assert np.abs(rows[-1, 9:] - found["tip"]).max() < 1e-12
+        for frame, row in zip(frames, rows, strict=True):
+            if frame["share"] == 1 and frame["kind"] != "tip":
+                own = [data.oMi[model.pinocchio.getJointId(frame["name"])]] if frame["kind"] == "joint" else ends
+                assert min(np.abs(np.append(one.rotation, one.translation) - row).max() for one in own) < 1e-9
