@@ -776,6 +776,7 @@ DOORWAYS = {
     "studies.shared.recorded_run": "a page of the checkout",
     "studies.mutation.mutants": "what the tool has just written",
     "compiled.translate.c": "a file of ours in C",
+    "compiled.browser.script": "a file of ours in JavaScript",
     "compiled.run.backends": "compares a file with what is generated, byte for byte",
     "export.python_text": "a template of ours",
     "studies.shared.machine": "a file of the kernel",
