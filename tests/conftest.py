@@ -102,8 +102,8 @@ def missing(reason: str) -> None:
 
 
 OPTIONAL = re.compile(
-    r"(PIL|build|control|dask|daqp|distributed|example_robot_data|ikpy|latex2mathml|matplotlib|mkdocs|mujoco|mypy|nbclient|nbformat|numba"
-    r"|pink|playwright|pybullet|pydrake|roboticstoolbox|twine|urchin|uv|viser)\b"
+    r"(PIL|build|control|dask|daqp|distributed|example_robot_data|ikpy|latex2mathml|matplotlib|mcap|mcap_ros2|mkdocs|mujoco|mypy"
+    r"|nbclient|nbformat|numba|pandas|pink|playwright|pybullet|pydrake|roboticstoolbox|twine|urchin|uv|viser)\b"
 )
 """What the extras bring besides `test`, as imported."""
 _TOLD = re.compile(r"\S+ is not installed; it is part of an extra")

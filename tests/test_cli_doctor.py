@@ -207,7 +207,6 @@ def test_the_packages_are_those_of_pyproject() -> None:
         "hypothesis",
         "mpmath",
         "mypy",
-        "pandas",
         "pytest",
         "pytest-timeout",
         "pytest-xdist",

@@ -102,7 +102,7 @@ ROOMS = {
     "learning": "core model environment statics identification compiled",
     "jax": "core learning",
     "torch": "core learning",
-    "export": "core inflated_beam constant_curvature description robots model environment",
+    "export": "core inflated_beam constant_curvature description robots model environment statics dynamics",
     "view": "core inflated_beam constant_curvature helix description robots model environment statics dynamics identification",
     "cli": "core inflated_beam constant_curvature helix description robots model environment statics dynamics identification"
     " compiled export view",

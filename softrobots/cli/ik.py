@@ -10,7 +10,15 @@ import pinocchio as pin
 
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
-from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
+from softrobots.cli.options.output_files import (
+    ROS_FILES,
+    add_output,
+    add_plot,
+    check_output,
+    check_plot,
+    save,
+    write_plot,
+)
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.reports.ik_report import solution_answer, trajectory_answer
@@ -77,7 +85,10 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--gain", "K", f"gain of --method paper [1/s] ({_GAIN:g})")
     help_text = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
     parser.add_argument("--allow-jumps", action="store_true", help=help_text)
-    add_output(parser, "the solution or trajectory as NPZ, for softrobots.load_result, or a trajectory as a .csv table")
+    help_text = (
+        "the solution or trajectory as NPZ, for softrobots.load_result, as .yaml, a message of ROS 2, as .mcap, a log of "
+    )
+    add_output(parser, help_text + "ROS 2 and Foxglove (extra mcap), or a trajectory as a .csv table")
     add_plot(parser, "the loaded shape, or the poses along the path")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -86,7 +97,7 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Solve and print the answer."""
     _refuse_contradictions(arguments)
-    check_output(arguments, ".npz", *([".csv"] if arguments.waypoints is not None else []))
+    check_output(arguments, ".npz", *ROS_FILES, *([".csv"] if arguments.waypoints is not None else []))
     check_plot(arguments)
     path = None if arguments.waypoints is None else read_waypoints(arguments.waypoints)
     model = statics_model_of(arguments)

@@ -13,6 +13,7 @@ import numpy as np
 from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_loads, loads_of
 from softrobots.cli.options.output_files import (
+    ROS_FILES,
     add_output,
     add_plot,
     check_ending,
@@ -88,7 +89,10 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--time-step", "T", "fixed steps of this length [s] (steps chosen for the tolerance)")
     add_numbers(parser, "--tolerance", "D", "largest error of the tip [m] (5e-4 of the reach); not with --time-step")
     add_numbers(parser, "--output-step", "T", "time between two rows of the result [s] (a 200th of the duration)")
-    add_output(parser, "the motion as NPZ or .json, for softrobots.load_result, or as a .csv table")
+    help_text = (
+        "the motion as NPZ or .json, for softrobots.load_result, as a .csv table, as .yaml, a message of ROS 2, or as .mcap, "
+    )
+    add_output(parser, help_text + "a log of ROS 2 and Foxglove (extra mcap)")
     add_plot(parser, "the tip over time")
     help_text = "draw the energies and their balance over time into this PNG file (none)"
     parser.add_argument("--energies", type=Path, metavar="FILE.png", help=help_text)
@@ -138,7 +142,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def _check_files(arguments: argparse.Namespace) -> None:
     """Refuse files that cannot be written, and options without effect, before the work."""
-    check_output(arguments, ".npz", ".json", ".csv")
+    check_output(arguments, ".npz", ".json", ".csv", *ROS_FILES)
     for option in _PICTURES:
         check_plot(arguments, option)
     if arguments.page is not None:

@@ -8,9 +8,14 @@ from pathlib import Path
 from typing import Any
 
 from softrobots.core.errors import ParameterError
-from softrobots.core.files import new_file
+from softrobots.core.files import new_file, write_text
 from softrobots.core.result_file import save_csv, save_result
+from softrobots.export.mcap_log import require_mcap, write_mcap
+from softrobots.export.ros_messages import to_ros2_yaml
 from softrobots.view.figures import canvas
+
+ROS_FILES = (".yaml", ".mcap")
+"""Endings of files for ROS 2."""
 
 
 def add_output(parser: argparse.ArgumentParser, what: str) -> None:
@@ -25,9 +30,12 @@ def check_output(arguments: argparse.Namespace, *endings: str) -> None:
         ParameterError: If its name has none of the endings.
         OutputExists: If it exists and `--overwrite` is not given, or it is a folder.
         OutputError: If its folder cannot be created.
+        MissingDependency: If it is a log, and what writes it is not installed.
     """
     if arguments.output is not None:
         check_ending("-o", arguments.output, *endings)
+        if arguments.output.suffix.lower() == ".mcap":
+            require_mcap()
         new_file(arguments.output, overwrite=arguments.overwrite)
 
 
@@ -40,8 +48,13 @@ def save(arguments: argparse.Namespace, result: Any) -> list[Path]:
     """
     if arguments.output is None:
         return []
-    write = save_csv if arguments.output.suffix.lower() == ".csv" else save_result
+    writers: dict[str, Callable[..., Path]] = {".csv": save_csv, ".mcap": write_mcap, ".yaml": _write_message}
+    write: Callable[..., Path] = writers.get(arguments.output.suffix.lower(), save_result)
     return [write(result, arguments.output, overwrite=arguments.overwrite)]
+
+
+def _write_message(result: Any, path: Path, *, overwrite: bool) -> Path:
+    return write_text(path, to_ros2_yaml(result), overwrite=overwrite)
 
 
 def add_plot(parser: argparse.ArgumentParser, what: str) -> None:

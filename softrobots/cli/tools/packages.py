@@ -16,6 +16,8 @@ EXTRAS = {
     "jax": "derivatives in JAX: softrobots.jax",
     "torch": "derivatives in PyTorch: softrobots.torch",
     "control": "linear models as state spaces of python-control",
+    "pandas": "tables as DataFrames: softrobots.to_dataframe",
+    "mcap": "logs for ROS 2 and Foxglove: -o FILE.mcap",
     "viser": "sliders in the browser: softrobots view ROBOT --sliders",
     "pictures": "pictures of the browser view",
     "robots": "the UR5 and other third-party robots",
