@@ -97,7 +97,7 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Solve and print the answer."""
     _refuse_contradictions(arguments)
-    check_output(arguments, ".npz", *ROS_FILES, *([".csv"] if arguments.waypoints is not None else []))
+    check_output(arguments, ".npz", *([".csv"] if arguments.waypoints is not None else []), *ROS_FILES)
     check_plot(arguments)
     path = None if arguments.waypoints is None else read_waypoints(arguments.waypoints)
     model = statics_model_of(arguments)
