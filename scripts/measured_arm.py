@@ -34,7 +34,7 @@ from studies.shared.checkout import CHECKOUT
 from studies.shared.folders import free_folder
 from studies.shared.recorded_run import check_page, command_of, write_record
 
-NAME, PAGE = "measured_arm", "measured.md"
+NAME, PAGE = "measured_arm", "measured_arm.md"
 OPTIONS = ("stiffness", "pretension", "weight", "mass", "every")
 
 
@@ -57,7 +57,7 @@ def parser() -> argparse.ArgumentParser:
     help_text = "new or empty folder for tables (Markdown, JSON), every row (CSV) and pictures (PNG)"
     options.add_argument("--output", type=Path, metavar="FOLDER", help=help_text)
     help_text = (
-        "write the tables of docs/measured.md, docs/validation/measured_arm.json and the pictures of a checkout (this one)"
+        "write the tables of docs/measured_arm.md, docs/validation/measured_arm.json and the pictures of a checkout (this one)"
     )
     options.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
     return options

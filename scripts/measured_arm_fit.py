@@ -22,7 +22,7 @@ from studies.measured_arm.pictures import drawn
 from studies.shared.checkout import CHECKOUT
 from studies.shared.recorded_run import check_page, write_record
 
-PAGE = "measured.md"
+PAGE = "measured_arm.md"
 
 
 def parser() -> argparse.ArgumentParser:
@@ -30,7 +30,7 @@ def parser() -> argparse.ArgumentParser:
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--compare", action="store_true", help="compare sets of parameters on families left out, instead")
     options.add_argument("--json", action="store_true", help="print the numbers as one JSON object instead of tables")
-    help_text = "write the tables of docs/measured.md, docs/validation/ and the pictures of a checkout (this one)"
+    help_text = "write the tables of docs/measured_arm.md, docs/validation/ and the pictures of a checkout (this one)"
     options.add_argument("--docs", type=Path, nargs="?", const=CHECKOUT, metavar="CHECKOUT", help=help_text)
     return options
 

@@ -109,8 +109,7 @@ def test_what_friction_wedges_against_the_floor_springs_off_it() -> None:
     """A ball on an inclined rail with mu > tan(angle): past the cone no sliding opposes its friction, only free space is left.
 
     With the compliance W of the springs that is W_zz < mu W_xz: friction that acts down the rail closes the gap by more than
-    the normal force opens it (A. Klarbring, Examples of non-uniqueness and non-existence of solutions to quasistatic contact
-    problems with friction, Ingenieur-Archiv 60, 1990).
+    the normal force opens it.
     """
     angle, friction, pushed = 0.3, 0.6, 0.1
     ways = np.array([[np.cos(angle), np.sin(angle)], [-np.sin(angle), np.cos(angle)]])

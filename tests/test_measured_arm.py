@@ -264,7 +264,7 @@ def recorded() -> dict:
 
 
 def test_the_page_shows_the_record() -> None:
-    page = (CHECKOUT / "docs" / "measured.md").read_text(encoding="utf-8")
+    page = (CHECKOUT / "docs" / "measured_arm.md").read_text(encoding="utf-8")
     assert f"\n\n{table(recorded())}\n\n<!-- measured_arm:end -->\n" in page
 
 

@@ -28,7 +28,7 @@ def environments() -> list[dict[str, Any]]:
 def pages() -> list[str]:
     return [
         (CHECKOUT / "docs" / name).read_text(encoding="utf-8")
-        for name in ("validation.md", "agreement.md", "motion.md", "measured.md", "other_tools.md")
+        for name in ("validation.md", "agreement.md", "motion.md", "measured.md", "measured_arm.md", "other_tools.md")
     ]
 
 

@@ -17,7 +17,7 @@ class TendonArm(ContinuumArm):
 
     It stands straight along +z at rest and has the two rigid chains of `PccArm`. The tendons of a segment are fixed at its end
     and run from the base through the disks of all segments before it, parallel to the backbone (`routing`). They only pull.
-    Backbone, tendons and sizes are those of a published robot with recordings, `docs/measured.md`.
+    Backbone, tendons and sizes are those of a published robot with recordings, `docs/measured_arm.md`.
 
     The disks are mass, spread evenly along the backbone; one is drawn at the end of each section. Every per-segment field
     accepts one number for all segments or one for each, and is stored as a tuple; a field of tendons also one for each tendon,

@@ -117,9 +117,8 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
 def let_go(last: Sliding) -> Sliding:
     """Return the same with contacts that are taken as open at first.
 
-    Where friction closes a gap by more than the normal force opens it, nothing but free space follows the edge of the cone (A.
-    Klarbring, Examples of non-uniqueness and non-existence of solutions to quasistatic contact problems with friction,
-    Ingenieur-Archiv 60, 1990).
+    Where friction closes a gap by more than the normal force opens it, nothing but free space follows the edge of the cone
+    (docs/theory.md, 9.5).
     """
     return replace(last, forces={key: (-_OPENS * force, np.zeros(3)) for key, (force, _) in last.forces.items()})
 

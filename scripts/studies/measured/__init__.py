@@ -1,0 +1,1 @@
+"""Models beside measurements that others have published: `scripts/measured.py`."""

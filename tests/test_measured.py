@@ -1,0 +1,141 @@
+"""Measurements of others beside predictions: the page, the numbers behind it, and each comparison anew by other means."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+from studies.measured import boom, inflated_link, kite_tubes
+from tests.conftest import CHECKOUT
+from tests.support.scripts import load_script, run_script
+
+NAMES = ("inflated_link", "kite_tubes", "boom")
+
+
+def recorded(name: str) -> Any:
+    return json.loads((CHECKOUT / "docs" / "validation" / f"measured_{name}.json").read_text(encoding="utf-8"))
+
+
+def test_the_page_shows_the_records() -> None:
+    page, script = (CHECKOUT / "docs" / "measured.md").read_text(encoding="utf-8"), load_script("measured")
+    assert tuple(script.COMPARISONS) == NAMES
+    for name, one in script.COMPARISONS.items():
+        assert f"\n\n{one.table(recorded(name))}\n\n<!-- measured_{name}:end -->\n" in page
+        assert (CHECKOUT / "docs" / "images" / f"measured_{name}.png").stat().st_size > 10_000
+        assert f"(images/measured_{name}.png)" in page
+    assert f"{script.BEGIN}\n\n{script.overview(CHECKOUT)}\n\n{script.END}\n" in page
+
+
+# --- The inflated link
+
+
+def test_moments_of_the_link_are_those_of_a_membrane_tube() -> None:
+    """pi p r^3 by 1/2, pi/4 and 1 against the printed largest moments; and the paper's own limit as printed."""
+    record = inflated_link.run()
+    printed = {10: (4.99, 4.11), 20: (9.45, 8.21), 30: (14.99, 12.32), 40: (18.77, 16.42), 50: (21.76, 20.53)}
+    ratios = []
+    for row, (pressure, (largest, limit)) in zip(record["rows"], printed.items(), strict=False):
+        bound = math.pi * 1e3 * pressure * 0.055**3
+        assert (row["pressure_Pa"], row["largest_moment"]) == (1e3 * pressure, largest)
+        assert [row["slack"], row["collapse"]] == pytest.approx([bound / 2.0, bound], rel=1e-12)
+        assert row["wrinkling"] == pytest.approx(limit, abs=0.005)  # printed to two digits
+        ratios.append(bound / largest - 1.0)
+    assert record["moments"]["collapse"]["rms"] == pytest.approx(np.sqrt(np.mean(np.square(ratios))), rel=1e-12)
+    assert min(ratios) > 0.0  # a bound
+    kept = recorded("inflated_link")
+    assert kept["rows"] == record["rows"]
+    assert kept["stiffness"]["rms"] == pytest.approx(record["stiffness"]["rms"], rel=1e-9)
+
+
+# --- Tubes of kites
+
+
+def membrane_curvature(moment: float, bending: float, slack: float) -> float:
+    """Curvature of a tube whose wall goes slack, from the balance over its taut half angle u: D = sin u - u cos u."""
+    if moment <= slack:
+        return moment / bending
+    taut = brentq(lambda u: slack * (u - math.sin(u) * math.cos(u)) / (math.sin(u) - u * math.cos(u)) - moment, 1e-3, math.pi)
+    return slack / bending * math.pi / (math.sin(taut) - taut * math.cos(taut))
+
+
+def test_a_kites_tube_is_a_cantilever_whose_curvature_is_that_of_a_membrane() -> None:
+    """v = int kappa(F (L - x)) (L - x) dx, to 4 %: the first of twenty hinges feels 2.5 % less moment than the clamp."""
+    law = kite_tubes.Law()
+    young, _ = kite_tubes.material(law)
+    pressure, radius = 0.4, 0.09
+    bending = (young * 1e-4 + pressure * 1e5 * radius / 2.0) * math.pi * radius**3
+    slack = math.pi * pressure * 1e5 * radius**3 / 2.0
+    deflections, forces = kite_tubes.bent(pressure, radius, young)
+    arms = (np.arange(400) + 0.5) / 400.0
+    for number in (3, 8, 12):  # taut, half and far on the way to collapse
+        curvature = np.array([membrane_curvature(forces[number] * arm, bending, slack) for arm in arms])
+        assert deflections[number] == pytest.approx(float(np.mean(curvature * arms)), rel=0.04)
+
+
+def test_the_law_of_kites_tubes_starts_with_its_stiffness_and_ends_below_the_bound() -> None:
+    """Central difference at no force, 1e-6 of its own step; the source draws tubes of 0.16 and 0.18 m."""
+    law, step = kite_tubes.Law(), 1e-7
+    for row in recorded("kite_tubes")["rows"]:
+        pressure, radius = row["pressure_bar"], row["diameter_m"] / 2.0
+        slope = (law.force(pressure, radius, step) - law.force(pressure, radius, -step)) / (2.0 * step)
+        assert slope == pytest.approx(row["stiffness_law"], rel=1e-6)
+        assert row["collapse_law_N"] == pytest.approx(law.force(pressure, radius, row["collapse_m"]), rel=1e-12)
+        assert row["membrane_N"] == pytest.approx(math.pi * pressure * 1e5 * radius**3, rel=1e-12)
+        assert 0.8 < row["collapse_law_N"] / row["membrane_N"] < 0.9
+
+
+# --- The boom
+
+
+def test_the_boom_is_a_rod_on_a_spring() -> None:
+    """Small deflections in closed form, by which both numbers follow from a linear fit; eight hinges and 8 % of the length."""
+    small = boom.deflections(1.0, np.array([0.0, 1e-3]), 150.0, 700.0)
+    assert (small[1] - small[0]) / 1e-3 == pytest.approx(boom.straight(1.0, 150.0, 700.0), rel=4e-3)
+    data, record = boom.measurements(), recorded("boom")
+    assert data.tolist() == record["rows"]
+    assert len(data) == 53
+    first = {length: data[data[:, 0] == length][0, 2] for length in np.unique(data[:, 0])}
+    moved = data[:, 2] - [first[length] for length in data[:, 0]]
+    terms = np.stack([data[:, 1] * data[:, 0] ** 3 / 3.0, data[:, 1] * data[:, 0] ** 2], axis=1)
+    fitted = np.isin(data[:, 0], boom.FITTED)
+    loaded = data[:, 1] > 0.0
+    (flexible, loose), *_ = np.linalg.lstsq(terms[fitted & loaded], moved[fitted & loaded], rcond=None)
+    model = record["models"]["elastic clamp"]
+    assert model["bending_stiffness"] == pytest.approx(1.0 / flexible, rel=0.02)
+    assert model["clamp_stiffness"] == pytest.approx(1.0 / loose, rel=0.02)
+    left = (terms @ [flexible, loose] - moved)[~fitted & loaded]
+    assert model["predicted_m"] == pytest.approx(float(np.sqrt(np.mean(left**2))), abs=1e-4)
+
+
+# --- The script
+
+
+@pytest.mark.study
+def test_the_script_writes_what_is_recorded(tmp_path: Any, capsys: pytest.CaptureFixture) -> None:
+    """Two comparisons anew, to 1e-6 of what the page shows; the third takes half a minute."""
+    folder = tmp_path / "out"
+    assert run_script("measured", ["inflated_link", "kite_tubes", "--output", str(folder)]) == 0
+    assert "### kite_tubes" in capsys.readouterr().out
+    names = {f"{name}.{ending}" for name in NAMES[:2] for ending in ("json", "md", "png")}
+    assert {path.name for path in folder.iterdir()} == names
+    for name in NAMES[:2]:
+        found, kept = json.loads((folder / f"{name}.json").read_text()), recorded(name)
+        for one, other in zip(found["rows"], kept["rows"], strict=True):
+            numbers = [key for key, value in one.items() if isinstance(value, float)]
+            assert [one[key] for key in numbers] == pytest.approx([other[key] for key in numbers], rel=1e-6)
+    assert run_script("measured", ["boom", "--output", str(folder)]) == 2
+    assert "not empty" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("arguments", [["arm"], ["--docs", "nowhere"]])
+def test_the_script_refuses_bad_input(arguments: list[str], capsys: pytest.CaptureFixture) -> None:
+    try:
+        assert run_script("measured", arguments) == 2
+    except SystemExit as ended:
+        assert ended.code == 2
+    assert capsys.readouterr().out == ""
