@@ -25,7 +25,7 @@ from softrobots import helix
 from softrobots.cli.options.command_line import add_load, exit_status, gravity_of, refuse_too_large
 from softrobots.core.files import make_folder, write_text
 from softrobots.statics.loads import Load
-from softrobots.view.figures import canvas, loaded_robot
+from softrobots.view.figures import canvas, picture
 from studies.shared.command_line import serve, tell_written
 from studies.shared.folders import free_folder
 
@@ -96,7 +96,7 @@ def run(arguments: argparse.Namespace) -> Path:
         loaded = sr.solve_equilibrium(model, (), arguments.force, wrench=wind, gravity=gravity)
         summary = summarise(tube, design, pattern, loaded)
         step("pictures")
-        figure = None if arguments.no_plots else loaded_robot.shape(loaded)
+        figure = None if arguments.no_plots else picture.plot(loaded)
         make_folder(folder)
         with sr.view(model, loaded) as viewer:
             viewer.write_html(folder / "scene.html", title="Helical tube under load")

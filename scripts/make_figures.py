@@ -90,6 +90,11 @@ def link_laws() -> Any:
     return figure
 
 
+def one_pose() -> Any:
+    """The arm of docs/watch.md."""
+    return sr.plot(sr.solve_equilibrium(sr.load_model(sr.InflatableArm()), (0.3, 0.6, -0.8), (0, 10, -15)))
+
+
 def arm_buckling() -> Any:
     """The straight arm pushed along its axis, exactly and a little beside."""
     arm = sr.load_model(sr.InflatableArm())
@@ -220,6 +225,7 @@ FIGURES: dict[str, Callable[[], Any]] = {
         bending_test,
         link_laws,
         link_reaction,
+        one_pose,
         arm_buckling,
         arm_branches,
         vibration_modes,

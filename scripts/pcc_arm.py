@@ -20,7 +20,7 @@ from softrobots.cli.options.command_line import add_load, exit_status, gravity_o
 from softrobots.core.files import make_folder, write_text
 from softrobots.robots.continuum_arm import CHAINS
 from softrobots.statics.loads import Load
-from softrobots.view.figures import canvas, loaded_robot
+from softrobots.view.figures import canvas, picture
 from studies.shared.command_line import serve, tell_written
 from studies.shared.folders import free_folder
 
@@ -89,7 +89,7 @@ def run(arguments: argparse.Namespace) -> Path:
         shown = last = sr.solve_equilibrium(model, lengths, arguments.force, gravity=gravity)
     results["equilibrium"] = last
     summary = summarise(last)
-    figure = None if arguments.no_plots else loaded_robot.shape(last)
+    figure = None if arguments.no_plots else picture.plot(last)
     with sr.view(model, shown) as viewer:
         make_folder(folder)
         for name, result in results.items():

@@ -74,6 +74,7 @@ from softrobots.statics.tip_force.contact_place import locate_contact
 from softrobots.statics.trajectory import Trajectory, follow_trajectory
 from softrobots.statics.workspace import Workspace, sample_workspace
 from softrobots.version import __version__
+from softrobots.view.figures.picture import plot
 from softrobots.view.viewer import Viewer, view
 
 if TYPE_CHECKING:
@@ -169,6 +170,7 @@ __all__ = [
     "locate_contact",
     "measured_decay",
     "mount",
+    "plot",
     "post_buckling_branches",
     "pull_out_force",
     "quintic",

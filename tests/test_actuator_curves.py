@@ -13,7 +13,6 @@ from softrobots.statics.kinematics import frame_placement
 from softrobots.view.actuator_curves import actuator_curves, route_places
 from softrobots.view.appearance import body_parts
 from softrobots.view.body import BentSections
-from softrobots.view.figures import loaded_robot
 from softrobots.view.legend import tension_entries
 from softrobots.view.meshcat_page.page_text import legend_rows
 from softrobots.view.scene import SceneBuilder
@@ -194,7 +193,7 @@ def test_slack_tendons_are_dashed_on_pages_and_in_figures() -> None:
     rows = legend_rows(tension_entries([scene.actuators]))
     for row in rows.strip().splitlines():
         assert ("repeating-linear-gradient" in row) == any(f"{name}: slack" in row for name in slack)
-    axes = loaded_robot.shape(loose).axes[0]
+    axes = sr.plot(loose).axes[0]
     curves = {tuple(actuator.curve.shown[-1]): actuator.curve.name for actuator in scene.actuators}
     lines = {curves.get(tuple(np.array(line.get_data_3d())[:, -1])): line.get_linestyle() for line in axes.lines}
     assert {name for name, style in lines.items() if name is not None and style == "--"} == slack

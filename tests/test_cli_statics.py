@@ -18,7 +18,6 @@ import softrobots as sr
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.statics.equilibrium_summary import stability_words
 from softrobots.statics.stability import Stability
-from softrobots.view.figures.loaded_robot import loaded_shape
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
 from tests.support.tables import each_row
 
@@ -270,19 +269,17 @@ def test_solve_saves_and_draws_and_overwrites_nothing(told: Told, arm: sr.SoftMo
 def test_the_picture_shows_loaded_and_relaxed_arm(arm: sr.SoftModel, tool) -> None:
     tool("matplotlib")
     equilibrium = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 10, -15))
-    (axes,) = loaded_shape(equilibrium).axes
-    relaxed, loaded = (np.array(line.get_data_3d()).T for line in axes.lines)
+    (axes,) = sr.plot(equilibrium).axes
+    relaxed, loaded, tip = (np.array(line.get_data_3d()).T for line in axes.lines)
+    assert np.allclose(tip, [equilibrium.tip_position], rtol=0.0, atol=1e-12)
     assert np.allclose(loaded[-1], equilibrium.tip_position, rtol=0.0, atol=1e-12)
     rigid = np.array([np.cos(0.3), np.sin(0.3), 1.0])  # the rigid arm lies in the plane of motor 1
     along, up = 0.6 * np.cos(0.6) + 0.6 * np.cos(-0.2), 0.6 * np.sin(0.6) + 0.6 * np.sin(-0.2)
     assert np.allclose(relaxed[-1], rigid * (along, along, up), rtol=0.0, atol=1e-12)
-    assert [text.get_text() for text in axes.get_legend().get_texts()] == [
-        "relaxed springs, same motors",
-        "loaded",
-        "force, 18.0 N",
-    ]
+    texts = [text.get_text() for text in axes.figure.legends[0].get_texts()]
+    assert {"rigid arm, same motor angles", "line through the joints", "force 18 N"} <= set(texts)
     with pytest.raises(sr.ParameterError, match="an Equilibrium"):
-        loaded_shape(arm)
+        sr.plot(arm.pinocchio)
 
 
 def test_springs_that_are_taken_away_are_told(told) -> None:

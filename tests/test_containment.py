@@ -22,7 +22,6 @@ import pytest
 import softrobots as sr
 from softrobots.export import FORMATS, export_model
 from softrobots.view.figures import canvas, trajectories
-from softrobots.view.figures.loaded_robot import loaded_shape
 from softrobots.view.legend import LegendEntry
 from softrobots.view.local_requests import is_local
 from softrobots.view.meshcat_page.page_text import legend_rows
@@ -139,7 +138,7 @@ def test_files_are_written_where_the_caller_says(name: str, tmp_path: Path, monk
     sr.save_result(held, inner / "r.npz")
     with view(model, held) as viewer:
         viewer.write_html(inner / "p.html")
-    canvas.write_png(loaded_shape(held), inner / "f.png", overwrite=False)
+    canvas.write_png(sr.plot(held), inner / "f.png", overwrite=False)
     assert files_below(tmp_path) == wanted
     assert not Path("/tmp/softrobots_outside").exists()
 
@@ -163,7 +162,7 @@ def test_names_are_no_formulas_in_figures(name: str, tool: Callable[[str], Any])
     model = robot(name)
     held = sr.solve_equilibrium(model, (0.3,), (1.0, 2.0, -3.0))
     path = sr.Trajectory(np.array([0.0, 1.0]), np.array([held.tip_position] * 2), (held, held), "newton")
-    for figure in (loaded_shape(held), trajectories.motor_angles(path, path)):
+    for figure in (sr.plot(held), trajectories.motor_angles(path, path)):
         figure.draw_without_rendering()  # where formulas are read
 
 

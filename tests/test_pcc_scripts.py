@@ -14,7 +14,7 @@ from softrobots import constant_curvature
 from softrobots.statics.workspace import workspace_at
 from softrobots.view.actuator_curves import actuator_curves
 from softrobots.view.body import BentSections
-from softrobots.view.figures import loaded_robot, workspaces
+from softrobots.view.figures import workspaces
 from tests.conftest import CHECKOUT
 from tests.support.oracles import central_difference
 from tests.support.scripts import run_script
@@ -179,7 +179,7 @@ def test_workspace_refuses_bad_input(pcc: sr.SoftModel, tmp_path: Path) -> None:
 
 def test_figures_show_what_they_say(pcc: sr.SoftModel) -> None:
     loaded = sr.solve_equilibrium(pcc, LENGTHS, (6, 4, -3))
-    axes = loaded_robot.shape(loaded).axes[0]
+    axes = sr.plot(loaded).axes[0]
     lines = [np.array(line.get_data_3d()) for line in axes.lines]
     ends = [line[:, -1] for line in lines]
     assert any(np.allclose(end, loaded.tip_position, atol=1e-12) for end in ends)
@@ -187,8 +187,8 @@ def test_figures_show_what_they_say(pcc: sr.SoftModel) -> None:
         points = curve.points.T
         assert any(line.shape == points.shape and np.allclose(line, points, atol=1e-12) for line in lines)
     assert (axes.get_xlabel(), axes.get_zlabel()) == ("x [m]", "z [m]")
-    texts = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert {"backbone", "end of a segment", "without load, same muscle lengths"} <= set(texts)
+    texts = [text.get_text() for text in axes.figure.legends[0].get_texts()]
+    assert {"backbone", "body", "without load, same muscle lengths"} <= set(texts)
     found = sr.sample_workspace(pcc, 30)
     views = workspaces.workspace(found).axes
     dots = views[0].collections[0].get_offsets()
@@ -196,8 +196,6 @@ def test_figures_show_what_they_say(pcc: sr.SoftModel) -> None:
     assert "manipulability" in views[3].get_ylabel()
     with pytest.raises(sr.ParameterError, match="a Workspace"):
         workspaces.workspace(loaded)
-    with pytest.raises(sr.ParameterError, match="with sections"):
-        loaded_robot.shape(sr.solve_equilibrium(sr.load_model(sr.InflatableArm()), (0, 0, 0)))
 
 
 def test_the_second_robot_in_the_readme_runs() -> None:

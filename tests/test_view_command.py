@@ -254,7 +254,7 @@ def test_a_saved_result_becomes_a_page(arm: sr.SoftModel, tmp_path: Path, capsys
         "solution": sr.solve_ik(arm, (0.9, 0.3, 0.2), gravity=sr.EARTH_GRAVITY),
         "trajectory": sr.follow_trajectory(arm, path.positions, (0, 0, -3), times=path.times),
     }
-    legends = {"equilibrium": "force", "solution": "target (cross)", "trajectory": "path of the tip"}
+    legends = {"equilibrium": "force 18 N", "solution": "target (cross)", "trajectory": "path of the tip"}
     for name, result in results.items():
         sr.save_result(result, tmp_path / f"{name}.npz")
         page = tmp_path / f"{name}.html"
@@ -263,9 +263,8 @@ def test_a_saved_result_becomes_a_page(arm: sr.SoftModel, tmp_path: Path, capsys
         assert out.splitlines()[1:] == [f"{page}: written"]
         text = page.read_text(encoding="utf-8")
         assert "<title>inflatable_arm</title>" in text
-        assert [word for word in legends.values() if f"</span>{word}<" in text] == (
-            ["force", "path of the tip"] if name == "trajectory" else [legends[name]]
-        )
+        assert [word for word in legends.values() if f"</span>{word}<" in text] == [legends[name]]
+        assert ("</span>force 3 N<" in text) == (name == "trajectory")
     first = page.read_bytes()
     assert main(["view", "--result", str(tmp_path / "solution.npz"), "--html", str(page)]) == 2
     assert page.read_bytes() == first

@@ -135,7 +135,7 @@ def test_page_and_websocket_work_through_a_forwarded_port(browser: object, arm: 
         show_share(page, 0.0)
         first = pixels(page.screenshot())
         legend = page.locator("#softrobots-legend").inner_text().splitlines()
-        assert legend[:3] == ["inflatable_arm", "rigid arm, same motor angles", "force"]
+        assert legend[:3] == ["inflatable_arm", "rigid arm, same motor angles", "force 18 N"]
         assert legend[-1] == "wrinkled"
         viewer.show(sr.solve_equilibrium(arm, (0.0, 1.4, -1.8)))
         viewer.mark((0.4, 0.2, 0.1))

@@ -158,7 +158,7 @@ PAGES = {
     "plots": ApiPage(
         "Plots",
         "Pictures with matplotlib (extra `plot`). Each function returns a figure; `savefig` writes it.",
-        tuple(f"softrobots.view.figures.{path.stem}" for path in sorted(FIGURES.glob("[a-z]*.py"))),
+        (*_top("plot"), *(f"softrobots.view.figures.{path.stem}" for path in sorted(FIGURES.glob("[a-z]*.py")))),
     ),
     "results": ApiPage(
         "Files and results", "Results as files, without pickle.", _top("save_result", "load_result", "save_csv")

@@ -30,7 +30,7 @@ from softrobots.statics.time_law import read_waypoints
 from softrobots.statics.tip_search import POSITION_TOLERANCE
 from softrobots.statics.trajectory import METHODS, follow_trajectory
 from softrobots.view.figures import trajectories
-from softrobots.view.figures.loaded_robot import loaded_shape
+from softrobots.view.figures.picture import plot
 
 _EXAMPLES = """examples:
   softrobots ik inflatable_arm --target 0.9 0.3 0.2 --force 0 10 -15 --elbow up
@@ -136,7 +136,7 @@ def _reach(arguments: argparse.Namespace, model: SoftModel, options: dict[str, A
         if arguments.rpy is None or error.field != "orientation":
             raise
         raise ParameterError("--rpy", arguments.rpy, error.requirement) from error
-    files = save(arguments, solution) + write_plot(arguments, lambda: loaded_shape(solution.equilibrium))
+    files = save(arguments, solution) + write_plot(arguments, lambda: plot(solution))
     print_answer(arguments, solution_answer(solution), solution.summary(None), files)
 
 

@@ -20,7 +20,7 @@ from softrobots.statics.elastic_state import TOLERANCE
 from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.sensitivity import compliance
-from softrobots.view.figures.loaded_robot import loaded_shape
+from softrobots.view.figures.picture import plot
 
 _EXAMPLES = """examples:
   softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --force 0 10 -15
@@ -90,7 +90,7 @@ def run(arguments: argparse.Namespace) -> None:
     lines = text_of(parts, None)
     if arguments.critical_load is not None:
         lines += f"\ncritical load  {_critical_load(model, equilibrium, arguments, answer)}"
-    files = save(arguments, equilibrium) + write_plot(arguments, lambda: loaded_shape(equilibrium))
+    files = save(arguments, equilibrium) + write_plot(arguments, lambda: plot(equilibrium))
     print_answer(arguments, answer, lines, files)
 
 

@@ -21,7 +21,7 @@ from softrobots.view.appearance import (
     Colour,
 )
 from softrobots.view.robot_shapes import Shape
-from softrobots.view.scene import WRINKLING_COLOURS, Scene
+from softrobots.view.scene import WRINKLING_COLOURS, Arrow, Scene
 from softrobots.view.tension_scale import ZERO_COLOUR, DrawnActuator, scale_end, tension_colour
 
 _MOST_NAMED = 12  # actuators that are listed one by one
@@ -64,9 +64,7 @@ def legend(
         entries.append(LegendEntry(TAIL_COLOUR, "wall that has not come out"))
     entries += tension_entries([state.actuators for state in played or (scene,)])
     entries += [LegendEntry(PATH_COLOUR, "path of the tip")] * path + [LegendEntry(PATH_COLOUR, "target (cross)")] * target
-    entries += [LegendEntry(FORCE_COLOUR, "force")] * any(
-        not one.of_contact for state in states for one in state.arrows.values()
-    )
+    entries += force_entries([state.arrows for state in played or (scene,)])
     entries += [LegendEntry(CAPSULE_COLOUR, "capsules of links, which touch")] * any(state.capsules for state in states)
     entries += [LegendEntry(OBSTACLE_COLOUR, "obstacle")] * any(state.obstacles for state in states)
     entries += contact_entries([state.contacts for state in played or (scene,)])
@@ -76,6 +74,23 @@ def legend(
         entries.append(LegendEntry(colour, text))
         above = least
     return entries
+
+
+def force_entries(states: Sequence[Mapping[str, Arrow]]) -> list[LegendEntry]:
+    """Return the forces of some states of a robot, without those of contacts, and their sizes.
+
+    Args:
+        states: The arrows in each state.
+    """
+    sizes: dict[str, list[float]] = {}
+    for state in states:
+        for frame, arrow in state.items():
+            if not arrow.of_contact:
+                sizes.setdefault(frame, []).append(arrow.force)
+    if len(sizes) > _MOST_NAMED:
+        sizes = {f"each of {len(sizes)} frames": [size for some in sizes.values() for size in some]}
+    words = {frame: " to ".join(dict.fromkeys(f"{end(some):.3g}" for end in (min, max))) for frame, some in sizes.items()}
+    return [LegendEntry(FORCE_COLOUR, f"force{f' on {frame}' * (len(words) > 1)} {size} N") for frame, size in words.items()]
 
 
 def contact_entries(states: Sequence[Mapping[str, Contact]]) -> list[LegendEntry]:
