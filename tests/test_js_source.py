@@ -27,6 +27,7 @@ ROBOTS: dict[str, tuple[Any, float, float]] = {
     "PCC, lumped": (sr.PccArm(chain="lumped"), 0.5, 0.3),
     "tendons": (sr.TendonArm(), 0.05, 0.3),
     "helix": (sr.HelixTube(), 0.1, 0.3),
+    "two hinges": (sr.InflatableArm(link_model="two_hinges", torsion=True), 5.0, 1.0),
 }
 """Robots, size of the forces on their tips [N], and how far actuators go from relaxed to anywhere within their limits [-].
 
@@ -182,7 +183,8 @@ def plain_kernel(name: str) -> dict[str, Any]:
 def test_answers_are_those_of_python(browser: Any, name: str) -> None:
     """Springs and tip of random cases are those of `solve_equilibrium`; status and unknowns those of the same code in Python.
 
-    The first to 1e-9: both leave 1e-10 of the load out of balance at most; the second to the last bit.
+    The first to 1e-9: both leave 1e-10 of the load out of balance at most; the second to the last bit. Moments and axial forces
+    of inflated links differ by that times their stiffness, up to 100 N m/rad.
     """
     cases, model, kernel = random_cases(name, 50), compiled(name).model, plain_kernel(name)
     place = kernel["UNKNOWN"]
@@ -202,6 +204,12 @@ def test_answers_are_those_of_python(browser: Any, name: str) -> None:
             one = sr.solve_equilibrium(model, case["motors"], case["force"], gravity=case["gravity"])
             assert np.abs(one.q_springs - found["springs"]).max() < 1e-9
             assert np.abs(one.tip_position - found["tip"]).max() < 1e-9
+            limits = one.link_limits
+            carried = [limits.moments, limits.axial_forces, limits.slack_margins, limits.wrinkling_margins]
+            shown = [
+                [link[key] for link in found["links"]] for key in ("moment", "axialForce", "slackMargin", "wrinklingMargin")
+            ]
+            assert np.abs(np.array(shown) - carried).max(initial=0.0) < 1e-7
     assert certified > 40
 
 
@@ -222,3 +230,27 @@ def test_placements_are_those_of_pinocchio(browser: Any, name: str) -> None:
             if frame["share"] == 1 and frame["kind"] != "tip":
                 own = [data.oMi[model.pinocchio.getJointId(frame["name"])]] if frame["kind"] == "joint" else ends
                 assert min(np.abs(np.append(one.rotation, one.translation) - row).max() for one in own) < 1e-9
+
+
+@pytest.mark.system
+def test_bad_input_is_told(browser: Any) -> None:
+    """A TypeError says what came and what is required; lengths that no shape has are a status; a result is a start."""
+    code = """motors => { const found = (one) => { try { return solver.solve(one).status; } catch (error) {
+      return `${error.name}: ${error.message}`; } };
+      const named = Object.fromEntries(solver.actuators.map((one, i) => [one.name, motors[i]]));
+      const here = solver.solve({motors: named, force: [0, 0, 0.3]});
+      const near = solver.solve({motors, force: [0, 0, 0.3], from: here});
+      return [found({motors: motors.slice(1)}), found({motors, force: [0, NaN, 0]}), found({motors: {...named, other: 1}}),
+        found({motors: motors.map((one, i) => i === 2 ? -1 : one)}), found({motors, from: 3}), here.status, near.status,
+        Math.hypot(...here.tip.map((one, i) => one - near.tip[i]))]; }"""
+    length, force, name, none, start, *settled, apart = in_browser(
+        browser, "PCC, lengths", code, compiled("PCC, lengths").model.relaxed_motors.tolist()
+    )
+    assert length.startswith("TypeError: motors: [")
+    assert "required: 6 finite numbers [m]: muscle_1_1, " in length
+    assert force == "TypeError: force: [0, NaN, 0] came; required: 3 finite numbers [N]"
+    assert name.startswith("TypeError: motors: other is none of them; required: muscle_1_1, ")
+    assert none == Status.NOT_A_NUMBER
+    assert start.startswith("TypeError: from: 3 came")
+    assert settled == [Status.CERTIFIED, Status.CERTIFIED]
+    assert apart < 1e-9

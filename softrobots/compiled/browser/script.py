@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
+from softrobots.compiled.browser.links import inflated_links
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.program.shape_program import with_shape
@@ -14,6 +15,7 @@ from softrobots.compiled.statuses import Status
 from softrobots.compiled.translate.javascript import to_javascript
 from softrobots.compiled.translate.lines import comment
 from softrobots.constant_curvature.strain_chain import STRAINS
+from softrobots.model.muscle_lengths import CONSISTENT
 from softrobots.model.serial_chain import ChainSection, SerialChain, strains_of
 from softrobots.model.soft_model import SoftModel
 
@@ -22,8 +24,9 @@ def script(model: SoftModel, unknowns: Unknowns, program: Program, *, gravity: b
     """Return the script; see `CompiledStatics.js_source`."""
     layout, muscles = program.layout, len(unknowns.chain.muscle_paths.rest)
     shape = with_shape(program, unknowns, points)
-    names = ("settle", "settle_from", "evaluate", "look_at_shape", "FORCE", "UNKNOWN", "START", "TIP", "ERROR", "MIN_PIVOT")
-    kernel = to_javascript(shape.text, exported=(*names, *(["put_muscles"] if muscles else [])))
+    functions = ("settle", "settle_from", "evaluate", "look_at_shape", *(["put_muscles"] if muscles else []))
+    places = ("FORCE", "UNKNOWN", "START", "TIP", "ERROR", "MIN_PIVOT", "STRAINS", "NOT_A_NUMBER")
+    kernel = to_javascript(shape.text, exported=(*functions, *places))
     low, high = model.motor_limits.T
     relaxed = model.relaxed_motors
     rows = zip(model.actuators.names, model.actuators.units, low.tolist(), high.tolist(), relaxed.tolist(), strict=True)
@@ -45,6 +48,11 @@ def script(model: SoftModel, unknowns: Unknowns, program: Program, *, gravity: b
         "springs": [{"name": name, "unit": unit} for name, unit in _springs(unknowns.chain)],
         "statuses": [{"name": status.name, "text": status.explanation} for status in Status],
         "frames": shape.frames,
+        "loadsPlace": shape.loads,
+        "strains": len(unknowns.chain.rest),
+        "links": inflated_links(model, unknowns.chain, shape.frames),
+        "consistent": CONSISTENT,
+        "misfit": _misfit(unknowns.chain),
     }
     pieces = [
         comment([f"Equilibria of {unknowns.chain.name}, written by softrobots: makeSolver() returns a solver."]),
@@ -72,6 +80,17 @@ def _springs(chain: SerialChain) -> list[tuple[str, str]]:
         name, unit = strains[int(np.flatnonzero(row)[0])]
         found.append((name if np.count_nonzero(row) == 1 else f"{name} and others", unit))
     return found
+
+
+def _misfit(chain: SerialChain) -> list[list[float]] | None:
+    """Return what changes of given lengths miss the nearest shape by, of each change; None where lengths are not given.
+
+    Straight muscles along a segment only: of others only the solver tells.
+    """
+    if not chain.constrained:
+        return None
+    arms = chain.muscle_paths.at(chain.rest).arms
+    return [[float(one) for one in row] for row in np.eye(len(arms)) - arms @ chain.spread]
 
 
 def _finite(limit: float) -> float | None:

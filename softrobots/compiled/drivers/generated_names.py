@@ -96,6 +96,7 @@ WHOLE_STEP: int
 ELASTIC_ROW: tuple[int, ...]
 ELASTIC_SHARE: tuple[float, ...]
 ELASTIC_STRAIN: tuple[int, ...]
+LOADS: int
 N_ELASTIC: int
 N_PLACED: int
 N_POINTS: int
@@ -107,6 +108,7 @@ PLACEMENTS: int
 SPRINGS: int
 STRAINS: int
 STRAIN_REST: tuple[float, ...]
+STRAIN_STIFFNESS: tuple[float, ...]
 UNKNOWN_STRAIN: tuple[int, ...]
 
 # Numbers of the robot: spring rounding [N m], reach [m], tables by unknown, motor or muscle.
@@ -141,6 +143,7 @@ target_pass_lanes: Callable[[Array], None]
 target_step: Callable[[Array], None]
 
 # Straight-line functions of the shape: place to write, row of the table, placement before, coordinate, number of the point.
+bend_slack_walls: Callable[[Array], None]
 place_section: Callable[[Array, int, int, int, int, int], None]
 place_slide: Callable[[Array, int, int, int, int, int], None]
 place_turn: Callable[[Array, int, int, int, int, int], None]

@@ -7,7 +7,7 @@ from softrobots.compiled.drivers.intrinsics import Array
 
 
 def look_at_shape(w: Array) -> None:
-    """Write all strains, the elastic coordinates, and the placements of joints and of points along sections.
+    """Write strains, loads of their springs, elastic coordinates, and placements of joints and of points along sections.
 
     A placement is a rotation matrix, row by row, and a position, in the world. That of a joint is Pinocchio's.
     """
@@ -15,6 +15,9 @@ def look_at_shape(w: Array) -> None:
         w[STRAINS + i] = STRAIN_REST[i]
     for i in range(N):
         w[STRAINS + UNKNOWN_STRAIN[i]] = w[UNKNOWN + i]
+    for i in range(N_STRAINS):
+        w[LOADS + i] = STRAIN_STIFFNESS[i] * (w[STRAINS + i] - STRAIN_REST[i])
+    bend_slack_walls(w)
     for i in range(N_SPRINGS):
         w[SPRINGS + i] = 0.0
     for i in range(N_ELASTIC):

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.compiled.chain.elements import Screw, Vector, turned, vector
+from softrobots.compiled.chain.slack_hinges import with_slack_hinges
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import shape_drivers
 from softrobots.compiled.program.generated_module import Program, functions_of, text_of
@@ -25,6 +26,8 @@ class Shape(NamedTuple):
     """Its text."""
     springs: int
     """Place of the elastic coordinates."""
+    loads: int
+    """Place of the loads on the springs of all strains [N m or N]."""
     placements: int
     """Place of the first placement, of twelve numbers each."""
     size: int
@@ -37,7 +40,8 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
     """Append `look_at_shape` to a program, with `points` placements along each section; see `shape_drivers`."""
     chain = unknowns.chain
     strains, springs = program.size, program.size + len(chain.rest)
-    placements = springs + len(chain.elastic)
+    loads = springs + len(chain.elastic)
+    placements = loads + len(chain.rest)
     records, kinds, coordinates, frames = [], [], [], []
     axes = np.eye(3)  # of the chain's frame in Pinocchio's of the same joint
     for element in chain.elements:
@@ -63,6 +67,7 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
     rows, columns = np.nonzero(chain.elastic)
     values = {
         "STRAINS": strains,
+        "LOADS": loads,
         "SPRINGS": springs,
         "PLACEMENTS": placements,
         "N_STRAINS": len(chain.rest),
@@ -71,6 +76,7 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
         "N_PLACED": len(kinds),
         "N_POINTS": points,
         "STRAIN_REST": tuple(chain.rest.tolist()),
+        "STRAIN_STIFFNESS": tuple(chain.stiffness.tolist()),
         "UNKNOWN_STRAIN": unknowns.strains,
         "ELASTIC_ROW": tuple(rows.tolist()),
         "ELASTIC_STRAIN": tuple(columns.tolist()),
@@ -81,10 +87,10 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
         "SHARES": tuple((k + 1) / points for k in range(points)),
     }
     lines = [f"{name} = {value if value != () else (0,)!r}" for name, value in values.items()]
-    blocks = [_place(kind).text() for kind in _KINDS]
+    blocks = [*(_place(kind).text() for kind in _KINDS), _slack_walls(unknowns, strains, loads).text()]
     functions = map(text_of, functions_of(shape_drivers))
     text = "\n\n\n".join([program.text.rstrip(), "\n".join(lines), *blocks, *functions]) + "\n"
-    return Shape(text, springs, placements + 12, placements + 12 * (len(frames) + 1) + 1, frames)
+    return Shape(text, springs, loads, placements + 12, placements + 12 * (len(frames) + 1) + 1, frames)
 
 
 def _place(kind: str) -> Block:
@@ -106,6 +112,18 @@ def _place(kind: str) -> Block:
         axes = axes @ _matrix(record[12:])
     block.store_all(0, axes.ravel().tolist(), "at")
     block.store_all(9, origin.tolist(), "at")
+    return block
+
+
+def _slack_walls(unknowns: Unknowns, strains: int, loads: int) -> Block:
+    """Trace the loads on the springs of hinges whose wall goes slack, at the strains in the workspace."""
+    block, chain = Block("bend_slack_walls", "Write the loads of springs that are not linear."), unknowns.chain
+    if unknowns.slack_hinges:
+        rows = range(len(chain.elements))
+        elements = [unknowns.traced(row, block.load, lambda place: block.load(strains + place)) for row in rows]
+        for row, one in enumerate(with_slack_hinges(unknowns, elements, chain)):
+            if one.law is not None:
+                block.store(loads + strains_of(chain.elements[row])[0], one.law.torque)
     return block
 
 

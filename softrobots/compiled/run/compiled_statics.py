@@ -118,8 +118,9 @@ class CompiledStatics:
         The result of `solve` has `status` and `statusText` (see `Status`), `tip` [m], `springs` (as `Equilibrium.q_springs`),
         `residual` [N m], `minPivot` (the smallest pivot of the tangent stiffness, by its spring's own) and `placements`: for
         each of `frames` a rotation matrix, row by row, and a position [m] in the world. Frames are those of joints,
-        Pinocchio's, of points along sections at a share of their length, and the tip. Other numbers than finite ones throw a
-        TypeError. With the status `NOT_A_NUMBER` all that was not found is zero or NaN.
+        Pinocchio's, of points along sections at a share of their length, and the tip. `links` has for each inflated link
+        `{name, moment, axialForce, slackMargin, wrinklingMargin}` as `Equilibrium.link_limits`. Other numbers than finite ones
+        throw a TypeError. With the status `NOT_A_NUMBER` the other numbers mean nothing.
 
         Args:
             gravity: Write the code for robots with weight; it solves weightless ones, too.
