@@ -9,6 +9,7 @@ import softrobots.identification.saved_identification
 import softrobots.identification.saved_measurements
 import softrobots.statics.contact.saved_path  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
+from softrobots.core.data_frame import to_dataframe
 from softrobots.core.errors import (
     ClusterError,
     DescriptionError,
@@ -187,6 +188,7 @@ __all__ = [
     "solve_ik",
     "solve_imposed_displacement",
     "straight_line",
+    "to_dataframe",
     "vibration_modes",
     "view",
     "waypoints",

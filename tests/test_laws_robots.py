@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import tempfile
 from functools import cache
@@ -12,6 +13,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+import yaml
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -120,6 +122,27 @@ def test_what_is_written_for_other_tools_is_the_same_robot(motors: list[float], 
         assert (rows[name]["stiffness"]["value"], rows[name]["rest"]["value"]) == (stiffness, rest)
 
 
+@law("export.to_urdf", "export.to_ros2_yaml", "export.write_mcap")
+@settings(max_examples=3)
+@given(triples_, triples_.map(lambda force: 5.0 * np.array(force)))
+def test_a_pose_for_ros_is_that_of_the_robot(motors: list[float], force: np.ndarray) -> None:
+    """The description and the positions of its joints, as another program gets them, place the tip."""
+    found = sr.solve_equilibrium(paper_arm(), motors, force)
+    positions = yaml.safe_load(export.to_ros2_yaml(found))
+    chain = pin.buildModelFromXML(export.to_urdf(paper_arm()))
+    data, q = chain.createData(), pin.neutral(chain)
+    for name, value in zip(positions["name"], positions["position"], strict=True):
+        q[chain.joints[chain.getJointId(name)].idx_q] = value
+    pin.framesForwardKinematics(chain, data, q)
+    assert np.abs(data.oMf[chain.getFrameId("tip")].translation - found.tip_position).max() < 1e-12
+    with tempfile.TemporaryDirectory() as folder, contextlib.suppress(sr.MissingDependency):
+        file = export.write_mcap(found, Path(folder) / "pose.mcap")
+        from mcap_ros2.reader import read_ros2_messages
+
+        ((at,),) = ([one.ros_msg.pose.position] for one in read_ros2_messages(str(file), topics=["/tip_pose"]))
+        assert np.abs(found.tip_position - (at.x, at.y, at.z)).max() < 1e-12
+
+
 @law("export.export_model", "export.to_pybullet")
 @settings(max_examples=4)
 @given(triples_)
@@ -192,7 +215,7 @@ def test_a_result_comes_back_from_its_file(motors: list[float], force: np.ndarra
     assert (read.stable, read.residual, read.model) == (equilibrium.stable, equilibrium.residual, robot)
 
 
-@law("save_csv", "read_waypoints", "follow_trajectory")
+@law("save_csv", "to_dataframe", "read_waypoints", "follow_trajectory")
 @settings(max_examples=3)
 @given(st.floats(-0.5, 0.5), st.floats(0.2, 0.5), st.integers(1, 3))
 def test_a_table_of_a_trajectory_is_its_way(side: float, height: float, steps: int) -> None:
@@ -202,6 +225,10 @@ def test_a_table_of_a_trajectory_is_its_way(side: float, height: float, steps: i
     with tempfile.TemporaryDirectory() as folder:
         file = sr.save_csv(found, Path(folder) / "way.csv")
         again, table = sr.read_waypoints(file), np.genfromtxt(file, delimiter=",", names=True)
+    with contextlib.suppress(sr.MissingDependency):
+        frame = sr.to_dataframe(found)
+        assert [name.replace(" ", "_") for name in frame] == list(table.dtype.names)
+        assert np.array_equal(frame.to_numpy(), np.stack([np.atleast_1d(table[name]) for name in table.dtype.names], axis=1))
     assert np.array_equal(again.positions, path.positions)
     assert np.array_equal(again.times, path.times)
     columns = {name: np.atleast_1d(table[name]) for name in table.dtype.names}

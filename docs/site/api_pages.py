@@ -161,7 +161,7 @@ PAGES = {
         (*_top("plot"), *(f"softrobots.view.figures.{path.stem}" for path in sorted(FIGURES.glob("[a-z]*.py")))),
     ),
     "results": ApiPage(
-        "Files and results", "Results as files, without pickle.", _top("save_result", "load_result", "save_csv")
+        "Files and results", "Results as files, without pickle.", _top("save_result", "load_result", "save_csv", "to_dataframe")
     ),
     "errors": ApiPage(
         "Errors",

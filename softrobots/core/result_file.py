@@ -5,6 +5,8 @@ A module with result classes adds them to `KINDS`.
 
 from __future__ import annotations
 
+import json
+import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -12,7 +14,6 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core import npz_file
-from softrobots.core.checks import FloatArray
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path, csv_text, new_file, write_atomically, write_text
 from softrobots.core.json_text import arrays_of_json, json_of_arrays
@@ -40,8 +41,10 @@ class Kind(NamedTuple):
     """Whether a result has any number of configurations, so that only `npz_file.LARGEST` limits it."""
     items: type | None = None
     """Class of the items where `cls` is `tuple`."""
-    to_table: Callable[[Any], dict[str, FloatArray]] | None = None
-    """Return the columns of a result over its rows, by their names, each shape (n,); None: it is no table."""
+    to_table: Callable[[Any], Mapping[str, Any]] | None = None
+    """Return the columns of a result over its rows, by their names, each with n numbers or words; None: it is no table."""
+    reading: Callable[[Any], dict[str, Any]] | None = None
+    """Return how the columns are read again, plain data; None: the names say it."""
 
     def holds(self, result: Any) -> bool:
         """Return whether a result is of this kind."""
@@ -61,6 +64,37 @@ class Kind(NamedTuple):
 
 KINDS: dict[str, Kind] = {}
 """Kinds of results by their name in the file."""
+
+TABLES: dict[type, Callable[[Any], Mapping[str, Any]]] = {}
+"""Columns of results that are tables, and are not saved otherwise, by their class."""
+
+OWN_COLUMNS = "# columns: "
+"""Beginning of the first line of a CSV file that says how its columns are read, as JSON."""
+
+
+class Table(NamedTuple):
+    """A result as a table."""
+
+    columns: Mapping[str, Any]
+    """Numbers or words by the name of the column."""
+    reading: dict[str, Any] | None
+    """How they are read again, if the names do not say it."""
+
+
+def table_of(result: Any) -> Table:
+    """Return a result as a table.
+
+    Raises:
+        ParameterError: If it is none.
+    """
+    for cls, to_table in TABLES.items():
+        if isinstance(result, cls):
+            return Table(to_table(result), None)
+    kind = next((kind for kind in KINDS.values() if kind.holds(result)), None)
+    if kind is None or kind.to_table is None:
+        tables = [str(kind) for kind in KINDS.values() if kind.to_table is not None]
+        raise ParameterError("result", result, f"one of {', '.join([*tables, *(cls.__name__ for cls in TABLES)])}")
+    return Table(kind.to_table(result), None if kind.reading is None else kind.reading(result))
 
 
 def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
@@ -85,7 +119,9 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
-    name = _kind_of(result, KINDS)
+    name = next((name for name, kind in KINDS.items() if kind.holds(result)), None)
+    if name is None:
+        raise ParameterError("result", result, f"one of {', '.join(map(str, KINDS.values()))}")
     path = as_path("path", path)
     target = new_file(path if path.suffix or path.is_dir() else path.with_suffix(".npz"), overwrite=overwrite)
     fields = {"format": np.array(FORMAT), "kind": np.array(name), **KINDS[name].to_arrays(result)}
@@ -97,19 +133,20 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
     return target
 
 
-def save_csv(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
-    """Save a trajectory, contact path, motion or vibration modes as a CSV table in full precision, a line a step.
+def save_csv(result: Any, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+    """Save a result that has rows as a CSV table in full precision.
 
-    Columns of a trajectory: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y,
-    tip_z` [m], `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for each motor and
-    spring [rad] (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link, and the normal force on
-    each obstacle that is touched. Those of a motion have their unit in their name: time, motors, springs, their velocities,
-    motor torques, tip, force on the tip and energies. So have those of a contact path: parameter, work of
-    friction, tip, sum of the contact forces, joints; and those of modes: frequency, damping ratio, effective masses, motion
-    of the tip and of each coordinate.
+    That is a trajectory, contact path, motion, vibration modes, workspace, measurements, or a batch of a compiled model.
+    Columns of a trajectory: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z`
+    [m], `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for each motor and spring
+    [rad] (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link, and the normal force on each
+    obstacle that is touched. Those of a motion have their unit in their name: time, motors, springs, their velocities, motor
+    torques, tip, force on the tip and energies. So have those of a contact path: parameter, work of friction, tip, sum of the
+    contact forces, joints; and those of modes: frequency, damping ratio, effective masses, motion of the tip and of each
+    coordinate. `to_dataframe` gives the same columns.
 
     Args:
-        result: The trajectory, contact path, motion or modes.
+        result: The result.
         path: File to write.
         overwrite: Replace an existing file.
 
@@ -121,10 +158,11 @@ def save_csv(result: Any, path: str | Path, *, overwrite: bool = False) -> Path:
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
-    tables = {name: kind.to_table for name, kind in KINDS.items() if kind.to_table is not None}
-    columns = tables[_kind_of(result, {name: KINDS[name] for name in tables})](result)
-    rows = zip(*(column.tolist() for column in columns.values()), strict=True)
-    return write_text(path, csv_text(columns, rows), overwrite=overwrite)
+    columns, reading = table_of(result)
+    cells = (column.tolist() if isinstance(column, np.ndarray) else column for column in columns.values())
+    rows = ([("" if cell != cell else cell) for cell in row] for row in zip(*cells, strict=True))
+    head = "" if reading is None else f"{OWN_COLUMNS}{json.dumps(reading)}\n"
+    return write_text(path, head + csv_text(columns, rows), overwrite=overwrite)
 
 
 def load_result(path: str | Path) -> Any:
@@ -156,14 +194,6 @@ def load_result(path: str | Path) -> Any:
     except Exception as error:  # arrays of another type or shape raise various errors of NumPy
         reason = f"it has no {error}" if isinstance(error, KeyError) else error
         raise FileFormatError(f"cannot read a result from {path}: {reason}") from error
-
-
-def _kind_of(result: Any, kinds: Mapping[str, Kind]) -> str:
-    """The name of the kind of a result, or ParameterError with the kinds that there are."""
-    name = next((name for name, kind in kinds.items() if kind.holds(result)), None)
-    if name is None:
-        raise ParameterError("result", result, f"one of {', '.join(map(str, kinds.values()))}")
-    return name
 
 
 def _is_json(path: Path) -> bool:

@@ -45,6 +45,6 @@ def to_urdf(model: SoftModel, *, mesh_folder: str | os.PathLike[str] | None = No
         compiler.set("strippath", "false")
         compiler.attrib.pop("meshdir", None)
     ElementTree.register_namespace("softrobots", NAMESPACE)
-    head = f"{root.get('name')}, with its springs as tags; written by softrobots. SI units and radians."
+    head = f"{root.get('name')}, written by softrobots with files of meshes that other tools find. SI units and radians."
     names = (f"Meshes that keep their name: {meshes.left_out} (not found, or not readable).",) if meshes.left_out else ()
     return document(root, (head, *names))

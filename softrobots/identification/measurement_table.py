@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -13,11 +12,10 @@ from softrobots.core.bounded_reading import opened
 from softrobots.core.checks import FloatArray
 from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError, SoftRobotsError
+from softrobots.core.result_file import OWN_COLUMNS
 from softrobots.core.yaml_text import parse_yaml
 from softrobots.identification.measurement_columns import QUANTITIES, read_columns
 from softrobots.robots.parameter_file import LARGEST_FILE
-
-_OWN_COLUMNS = "# columns: "
 
 
 def read_rows(path: Path, columns: Any = None) -> dict[str, Any]:
@@ -35,8 +33,12 @@ def read_rows(path: Path, columns: Any = None) -> dict[str, Any]:
     return found | {"lines": np.array(table.lines)}
 
 
-def arguments_of_table(table: Any, columns: Any) -> dict[str, Any]:
+def arguments_of_table(table: Any, columns: Any = None) -> dict[str, Any]:
     """Return the arguments of `Measurements` from a pandas table, or any mapping of names to columns."""
+    if columns is None:
+        columns = getattr(table, "attrs", {}).get("columns")
+        if columns is None:
+            raise ParameterError("columns", None, "a mapping, because the table is not one that to_dataframe made")
 
     def column(name: str) -> Any:
         try:
@@ -93,17 +95,12 @@ def table_of(arguments: Mapping[str, Any]) -> tuple[dict[str, Sequence[Any]], di
     return table, mapping | {"markers": arguments["markers"]}
 
 
-def own_columns_line(mapping: Mapping[str, Any]) -> str:
-    """Return the comment that begins a file which tells its own columns."""
-    return f"{_OWN_COLUMNS}{json.dumps(mapping)}\n"
-
-
 def _own_columns(path: Path) -> Any:
     with opened(path) as file:
         line = file.readline(LARGEST_FILE).decode("utf-8", "replace").removeprefix("\ufeff")
-    if not line.startswith(_OWN_COLUMNS):
+    if not line.startswith(OWN_COLUMNS):
         raise FileFormatError(f"{path} does not tell its columns, as files of Measurements.to_csv do: a mapping is required")
     try:
-        return parse_yaml(line.removeprefix(_OWN_COLUMNS))
+        return parse_yaml(line.removeprefix(OWN_COLUMNS))
     except FileFormatError as error:
         raise FileFormatError(f"cannot read {path}, line 1: {error}") from error

@@ -15,7 +15,8 @@ from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
-from softrobots.core.files import as_path, csv_text, write_text
+from softrobots.core.files import as_path
+from softrobots.core.result_file import save_csv
 from softrobots.identification.measured_robot import check_coordinates, frame_of, wrenches_on
 from softrobots.identification.measurement_checks import (
     TIP,
@@ -28,7 +29,7 @@ from softrobots.identification.measurement_checks import (
     with_gaps,
     words_of,
 )
-from softrobots.identification.measurement_table import arguments_of_table, own_columns_line, read_rows, table_of
+from softrobots.identification.measurement_table import arguments_of_table, read_rows
 from softrobots.model.soft_model import SoftModel, check_model
 
 
@@ -178,12 +179,13 @@ class Measurements:
             raise FileFormatError(f"{file}: {error}") from error
 
     @classmethod
-    def from_table(cls, table: Any, columns: Any) -> Measurements:
+    def from_dataframe(cls, table: Any, columns: Any = None) -> Measurements:
         """Take measurements from a pandas table, or any mapping of names to columns.
 
         Args:
             table: The table.
-            columns: Mapping of columns and units, or the path of its file, as for `from_csv`.
+            columns: Mapping of columns and units, or the path of its file, as for `from_csv`; None for tables of
+                `to_dataframe`, which tell their own.
 
         Raises:
             ParameterError: If the mapping or a number is refused.
@@ -192,17 +194,15 @@ class Measurements:
         """
         return cls(**arguments_of_table(table, columns))
 
+    from_table = from_dataframe
+    """The first name of `from_dataframe`."""
+
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write a CSV file in SI units that `from_csv` reads to the last bit; its first line is a comment with the mapping.
 
-        Raises:
-            ParameterError: If `path` is no path.
-            OutputExists: If the file exists and `overwrite` is false.
-            OutputError: If it cannot be written.
+        The same as `softrobots.save_csv`, with its errors.
         """
-        table, mapping = table_of(self.arguments())
-        rows = ([("" if cell != cell else cell) for cell in row] for row in zip(*table.values(), strict=True))
-        return write_text(path, own_columns_line(mapping) + csv_text(table, rows), overwrite=overwrite)
+        return save_csv(self, path, overwrite=overwrite)
 
     def __len__(self) -> int:
         """Return the number of rows."""

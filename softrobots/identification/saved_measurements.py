@@ -31,4 +31,11 @@ def _unpack(fields: Mapping[str, Any]) -> Measurements:
     return Measurements(**arguments_of_table(table, columns), lines=fields.get("lines"))
 
 
-KINDS["measurements"] = Kind(Measurements, _pack, _unpack, many=True)
+KINDS["measurements"] = Kind(
+    Measurements,
+    _pack,
+    _unpack,
+    many=True,
+    to_table=lambda measurements: table_of(measurements.arguments())[0],
+    reading=lambda measurements: table_of(measurements.arguments())[1],
+)

@@ -36,7 +36,7 @@ from softrobots.statics.loads import Load, load_of_data
 from softrobots.statics.tip_goal import Goal, checked_orientation
 from softrobots.statics.tip_path.csv_columns import trajectory_table
 from softrobots.statics.trajectory import Trajectory
-from softrobots.statics.workspace import FIELDS, Workspace, workspace_at
+from softrobots.statics.workspace import FIELDS, Workspace, workspace_at, workspace_table
 from softrobots.statics.workspace_map import WorkspaceMap, packed, unpacked
 
 _COLUMNS = ("q_motors", "q_springs", "residual", "tolerance", "iterations")
@@ -266,7 +266,7 @@ KINDS.update(
         lambda fields: estimate_at(_unpack_rows(fields)[0], fields),
     ),
     trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True, to_table=trajectory_table),
-    workspace=Kind(Workspace, _pack_workspace, _unpack_workspace, many=True),
+    workspace=Kind(Workspace, _pack_workspace, _unpack_workspace, many=True, to_table=workspace_table),
     workspace_map=Kind(WorkspaceMap, _pack_map, _unpack_map, many=True),
     branches=Kind(tuple, _pack_branches, _unpack_branches, many=True, items=EquilibriumBranch),
 )

@@ -12,6 +12,7 @@ from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.result_file import TABLES
 
 
 class CompiledEquilibrium:
@@ -161,3 +162,25 @@ class MotorBatch(Batch):
     """Distance of the loaded tip from its target, shape (n,) [m]."""
     orientation_error: FloatArray | None = None
     """Angle between the loaded tip and its target orientation, shape (n,) [rad]; None for positions."""
+
+
+_AXES = {"tip_positions": ("tip", "m"), "forces": ("force", "N")}
+_SINGLE = {"residual": "N m", "unexplained": "N m", "observability": "m", "tip_error": "m", "orientation_error": "rad"}
+
+
+def _table(batch: Batch) -> dict[str, FloatArray]:
+    """Columns of a CSV file of a batch, a line a case; actuators and springs by their number, in the order of the model."""
+    table: dict[str, FloatArray] = {"status": batch.status}
+    for name, values in vars(batch).items():
+        if name in _SINGLE and values is not None:
+            table[f"{name.replace('_', ' ')} [{_SINGLE[name]}]"] = values
+        elif name in _AXES:
+            what, unit = _AXES[name]
+            table |= {f"{what} {axis} [{unit}]": column for axis, column in zip("xyz", values.T, strict=True)}
+        elif name in ("q_motors", "q_springs"):
+            kind = "motor" if name == "q_motors" else "spring"
+            table |= {f"{kind} {number} [rad or m]": column for number, column in enumerate(values.T, 1)}
+    return table
+
+
+TABLES[Batch] = _table
