@@ -5,6 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
+import pinocchio as pin
 import pytest
 
 import softrobots as sr
@@ -33,6 +34,20 @@ def test_tip_pose_is_that_of_table_2(arm: sr.SoftModel, rng: np.random.Generator
         motors, springs = rng.uniform(-np.pi, np.pi, 3), rng.uniform(-1.5, 1.5, 4)
         found = frame_placement(arm, arm.configuration(motors, springs), "tip").homogeneous
         assert np.abs(found @ TIP_TO_DH - flexible_table(angles_of(motors, springs))[-1]).max() < ROUNDING
+
+
+def test_results_have_the_pose_of_the_tip_as_matrices_and_as_se3(arm: sr.SoftModel) -> None:
+    """That of Table 2 at their joint angles, at each waypoint too."""
+    path = sr.follow_trajectory(arm, [(0.9, 0.1, 0.2), (0.9, 0.2, 0.2), (0.8, 0.2, 0.3)], (0.0, 5.0, -10.0))
+    assert path.tip_poses.shape == (3, 4, 4)
+    for held, pose in zip(path.equilibria, path.tip_poses, strict=True):
+        assert np.abs(pose @ TIP_TO_DH - flexible_table(angles_of(held.q_motors, held.q_springs))[-1]).max() < ROUNDING
+        assert np.array_equal(held.tip_pose, pose)
+        assert np.array_equal(held.tip_pose[:3, 3], held.tip_position)
+        assert not held.tip_pose.flags.writeable
+        assert held.tip_se3 == pin.SE3(pose)
+    solution = sr.solve_ik(arm, (0.9, 0.1, 0.2), (0.0, 5.0, -10.0))
+    assert np.array_equal(solution.tip_pose, solution.equilibrium.tip_pose)
 
 
 def test_tip_pose_with_springs_at_zero_is_that_of_table_1(arm: sr.SoftModel, rng: np.random.Generator) -> None:

@@ -58,6 +58,11 @@ class IkSolution(Summarised):
         return self.equilibrium.q_motors
 
     @property
+    def tip_pose(self) -> FloatArray:
+        """Pose of the loaded tip in the world as a homogeneous matrix, shape (4, 4) [m]."""
+        return self.equilibrium.tip_pose
+
+    @property
     def wrist_singularity(self) -> str | None:
         """What is singular of the wrist, with the names of its motors; None if nothing is, or there is no spherical wrist.
 

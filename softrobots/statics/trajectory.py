@@ -74,6 +74,11 @@ class Trajectory(Summarised):
         return read_only(np.array([equilibrium.tip_position for equilibrium in self.equilibria]))
 
     @cached_property
+    def tip_poses(self) -> FloatArray:
+        """Poses of the loaded tip as homogeneous matrices, shape (n, 4, 4) [m]."""
+        return read_only(np.array([equilibrium.tip_pose for equilibrium in self.equilibria]))
+
+    @cached_property
     def tip_error(self) -> FloatArray:
         """Distance of the loaded tip from its target, shape (n,) [m]."""
         return read_only(np.linalg.norm(self.tip_positions - self.targets, axis=1))

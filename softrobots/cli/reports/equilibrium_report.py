@@ -21,7 +21,7 @@ def equilibrium_answer(equilibrium: Equilibrium) -> dict[str, Any]:
         *attributes(equilibrium, q_motors=joined_units(motors), motor_torques=joined_units(load_units(motors))),
         *attributes(equilibrium, q_springs=joined_units(springs), spring_torques=joined_units(load_units(springs))),
         Fact("tip_position", equilibrium.tip_position, "m"),
-        Fact("transform_tip_to_world", equilibrium.transform_tip_to_world.homogeneous, "m"),
+        Fact("transform_tip_to_world", equilibrium.tip_pose, "m"),
         Fact("link_moments", equilibrium.link_moments, "N m"),
         *attributes(limits, axial_forces="N", slack_moments="N m"),
         Fact("slack_margins", known_margins(limits.slack_margins), "-"),
