@@ -80,6 +80,14 @@ def has_finite_corners(geometry: Any) -> bool:
     return bool(np.all(np.abs(np.asarray(geometry.vertices())) <= _FARTHEST))  # NaN is not
 
 
+def bounds(geometry: Any) -> tuple[FloatArray, FloatArray]:
+    """Return the smallest and the largest coordinates of a shape in its own axes, each of shape (3,) [m]."""
+    if isinstance(geometry, Triangles):
+        return geometry.corners.min(axis=0), geometry.corners.max(axis=0)
+    geometry.computeLocalAABB()
+    return np.array(geometry.aabb_local.min_), np.array(geometry.aabb_local.max_)
+
+
 def triangles(geometry: Any) -> tuple[FloatArray, Any, bool]:
     """Return corners and triangles of a shape, and whether the triangles are flat.
 

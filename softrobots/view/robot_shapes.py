@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import warnings
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -15,7 +16,8 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ViewerError
 from softrobots.description.mesh_files import MissingMeshWarning, only_found
 from softrobots.model.soft_model import SoftModel
-from softrobots.view.mesh_triangles import ColouredPart, coloured_parts, has_finite_corners, readable
+from softrobots.view.camera import box_corners
+from softrobots.view.mesh_triangles import ColouredPart, bounds, coloured_parts, has_finite_corners, readable
 
 
 class Shape(NamedTuple):
@@ -87,16 +89,18 @@ class RobotShapes:
         poses = [np.array(pose.homogeneous) for pose in self._data.oMg]
         return [poses[shape.place] for shape in self.shapes]
 
+    @cached_property
+    def boxes(self) -> FloatArray:
+        """Corners of a box around each of `shapes` in its own axes, shape (n, 8, 3) [m]."""
+        return np.array([box_corners(*bounds(shape.geometry)) for shape in self.shapes]).reshape(-1, 8, 3)
+
     def ground(self) -> float | None:
         """Return the height of the lowest point that is fixed to the world [m]; None if no shape is fixed."""
         heights = []
         for shape in self._geometry.geometryObjects:
             if shape.parentJoint == 0:
-                shape.geometry.computeLocalAABB()
-                box = shape.geometry.aabb_local
-                middle, half = 0.5 * (np.array(box.max_) + np.array(box.min_)), 0.5 * (np.array(box.max_) - np.array(box.min_))
-                turned = np.abs(np.array(shape.placement.rotation)[2]) @ half
-                heights.append(float(shape.placement.act(middle)[2] - turned))
+                placed = shape.placement.rotation @ box_corners(*bounds(shape.geometry)).T
+                heights.append(float(shape.placement.translation[2] + placed[2].min()))
         return min(heights, default=None)
 
     def _elastic_joints(self) -> set[int]:

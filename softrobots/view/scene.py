@@ -32,6 +32,8 @@ from softrobots.view.animation_frames import (
     waypoint_frames,
 )
 from softrobots.view.body import BentSections, SegmentBody
+from softrobots.view.camera import box_corners, whole_view
+from softrobots.view.mesh_triangles import bounds
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.surroundings import DrawnObstacle, drawn_capsules, drawn_contacts, drawn_obstacles
 from softrobots.view.tension_scale import DrawnActuator, drawn_actuators
@@ -49,6 +51,8 @@ lightness too, for grey prints and colour-blind readers."""
 
 _RINGS = 16  # of a body in each frame of a motion; two a section at least
 _SHEETS = 1.0  # side of the sheet that stands for a half-space, of the size of the robot
+_SEEN = 60  # of the scenes of an animation, for which a camera is placed
+_ARROW = 0.27  # length of the largest arrow with its head, of the size of the robot
 _NO_FORCE = 1e-12  # [N], forces below have no arrow
 
 
@@ -115,12 +119,18 @@ class Extent(NamedTuple):
     ground: float
     """Height of the floor: of the lowest point that is fixed to the world, or a little below the origin [m]."""
 
-    def camera(self, tip: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return where a camera is that sees a robot with its tip there, and the point that it looks at, shape (3,) [m]."""
+    def camera(self, tip: FloatArray, points: FloatArray | None = None) -> tuple[FloatArray, FloatArray]:
+        """Return where a camera is that sees a robot with its tip there, and the point that it looks at, shape (3,) [m].
+
+        Args:
+            tip: Position of the tip, shape (3,) [m].
+            points: Points that it sees in any case, shape (n, 3) [m]; see `SceneBuilder.corners`.
+        """
         along, middle = tip - self.base, 0.5 * (self.base + tip)
         azimuth = np.arctan2(along[1], along[0]) - np.deg2rad(78.0)
         size = max(self.size, 0.95 * float(np.linalg.norm(along)))  # a robot that is bent at rest may be straight now
-        return middle + 0.94 * size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39]), middle
+        away = 0.94 * size * np.array([0.92 * np.cos(azimuth), 0.92 * np.sin(azimuth), 0.39])
+        return (middle + away, middle) if points is None else whole_view(points, away)
 
     def floor(self) -> FloatArray:
         """Return the two ends of each line of the floor, a sixth of the size apart along x and along y, shape (52, 3) [m]."""
@@ -179,6 +189,22 @@ class SceneBuilder:
             return {frame.number: self._scene(frame, max(_RINGS // max(sections, 1), 2)) for frame in moving}
         frames = (even_frames if sections else waypoint_frames)(movement, seconds)
         return {frame.number: self._scene(frame, 4) for frame in frames}
+
+    def corners(self, scenes: Sequence[Scene]) -> FloatArray:
+        """Return corners of boxes around what is drawn in some scenes, without obstacles larger than the robot, (n, 3) [m]."""
+        boxes, size, found = self.robot.boxes, self.extent.size, [np.stack([self.extent.base, self.extent.tip])]
+        for scene in (*scenes[:: max(len(scenes) // _SEEN, 1)], scenes[-1]):
+            for poses in (np.reshape(scene.deformed, (-1, 4, 4)), np.reshape(scene.rigid, (-1, 4, 4))):
+                found.append((boxes @ poses[:, :3, :3].transpose(0, 2, 1) + poses[:, None, :3, 3]).reshape(-1, 3))
+            for body in scene.segments:
+                found.append(box_corners(body.backbone.min(axis=0) - body.radius, body.backbone.max(axis=0) + body.radius))
+            for arrow in scene.arrows.values():
+                found.append(arrow.pose[:3, 3] + _ARROW * size * (1 - 2 * arrow.of_contact) * arrow.pose[None, :3, 1])
+            for obstacle in scene.obstacles:
+                placed = box_corners(*bounds(obstacle.geometry)) @ obstacle.pose[:3, :3].T + obstacle.pose[:3, 3]
+                if np.ptp(placed, axis=0).max() <= 1.5 * size:
+                    found.append(placed)
+        return np.concatenate(found)
 
     def growth(self, tube: HelixTube, seconds: float, front: float, hold: float) -> dict[int, Scene]:
         """Return the scenes of a growing tube by number of frame; see `growth_frames`.

@@ -88,7 +88,8 @@ class SliderPage(ServedPage):
         try:
             self._url = f"http://{LOOPBACK}:{self._server.get_port()}/"
             self._drawing = ViserDrawing(self._server, self._scenes.robot.shapes, self._scenes.extent, 0.5 * self._full)
-            self._drawing.look_at(self._equilibrium.tip_position)
+            seen = self._scenes.corners([self._scenes.loaded(self._equilibrium)])
+            self._drawing.look_at(self._equilibrium.tip_position, seen)
             self._panel = SliderPanel(self._server.gui, model, self._start, self._full, changed=self._wake.set)
             self._read_scene()
             self._draw()

@@ -52,7 +52,10 @@ class Viewer(WrittenPage):
             self._page = connect(self._server.zmq_url, self._url)
             root = self._page["softrobots"]
             self._robot = RobotDrawing(root, self._scenes.robot, self._scenes.relaxed(), self._scenes.extent.size)
-            self._stage = Stage(self._page, root, self._scenes.extent)
+            extent = self._scenes.extent
+            self._stage = Stage(self._page, root, extent)
+            upright = np.hypot(*(extent.tip - extent.base)[:2]) < 0.1 * extent.size
+            self.look_at(extent.tip + extent.size * np.array([0.3 if upright else -0.1, 0.0, 0.0 if upright else 0.2]))
             send_html(self._page, "page", live_page(model.pinocchio.name))
             self._legend = ""
             self._show_legend()
@@ -148,10 +151,10 @@ class Viewer(WrittenPage):
         self._check_open()
         scenes = self._scenes.movement(movement, seconds)
         path = movement.tip_position if isinstance(movement, Motion | ModeSwing) else movement.tip_positions
-        self.look_at(path.mean(axis=0))
         self._robot.show(next(iter(scenes.values())))
         self._robot.trace(path)
         self._page.set_animation(self._robot.animate(scenes), play=True, repetitions=repetitions)
+        self.look_at(path.mean(axis=0))
         self._show_legend()
 
     def animate_growth(self, tube: HelixTube, *, duration: float = 8.0, front: float | None = None, hold: float = 0.25) -> None:
@@ -181,14 +184,19 @@ class Viewer(WrittenPage):
         self._show_legend()
 
     def look_at(self, tip: FloatArray) -> None:
-        """Look at the middle between base and tip, square to the arm and a little from above.
+        """Look at all that is drawn, square to the line from the base to the tip and a little from above.
 
-        The base is the world's origin, unless the chain starts farther from it than it is long.
+        The base is the world's origin, unless the chain starts farther from it than it is long. The whole robot is in every
+        window, in all of an animation.
 
         Args:
             tip: Position of the tip, or its average, shape (3,) [m].
+
+        Raises:
+            ParameterError: If the shape differs or a number is not finite.
         """
-        self._stage.look_from(*self._scenes.extent.camera(tip))
+        points = self._scenes.corners(self._robot.scenes)
+        self._stage.look_from(*self._scenes.extent.camera(finite_array("tip", tip, (3,), "m"), points))
 
     def look_from(self, eye: Any, centre: Any) -> None:
         """Place the camera.

@@ -13,7 +13,7 @@ from softrobots.view.appearance import Colour, rgb
 from softrobots.view.legend import LegendEntry
 from softrobots.view.meshcat_page.page_commands import packed, read_page, tidied
 
-_HINT = "Drag: turn. Wheel or two fingers: nearer."
+_HINT = "Drag or arrow keys: turn. Wheel, two fingers, + or -: nearer or farther."
 
 
 @dataclass(frozen=True)
@@ -60,7 +60,7 @@ def page_text(static: str, title: str, legend: Sequence[LegendEntry]) -> str:
     script, commands = read_page(static)
     ordered = tidied(commands)
     moves = ordered and b"set_animation" in ordered[-1]
-    hint = _HINT + (" Controls: pause, time." if moves else "")
+    hint = _HINT + (" Space or Controls: pause. Controls: time." if moves else "")
     scene = _filled("packed_scene.html", packed=packed(script, ordered))
     generator = f'\n<meta name="generator" content="softrobots {__version__}">'
     return _page(title, f"{legend_rows(legend)}\n", hint, scene, generator)

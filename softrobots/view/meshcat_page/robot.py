@@ -52,6 +52,11 @@ class RobotDrawing:
         self._arrows.draw(scene.arrows)
         self._surroundings.draw([scene])
 
+    @property
+    def scenes(self) -> tuple[Scene, ...]:
+        """What is shown: one state, or those of an animation."""
+        return self._animated or (self._scene,)
+
     def trace(self, positions: FloatArray) -> None:
         """Draw a path, shape (n, 3) [m], as dots."""
         import meshcat.geometry as geometry

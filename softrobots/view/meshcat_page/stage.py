@@ -16,7 +16,7 @@ class Stage:
     """The surroundings of one robot. Meshcat's camera always looks at the origin, so the robot is moved there."""
 
     def __init__(self, page: Any, root: Any, extent: Extent) -> None:
-        """Draw a white background and the floor, and place the camera.
+        """Draw a white background and the floor; `look_from` places the camera.
 
         Args:
             page: The meshcat page.
@@ -26,13 +26,10 @@ class Stage:
         import meshcat.geometry as geometry
 
         self._page, self._root = page, root
-        size, tip = extent.size, extent.tip
         page["/Background"].set_property("top_color", [1.0, 1.0, 1.0])
         page["/Background"].set_property("bottom_color", [0.90, 0.92, 0.94])
         page["/Axes"].set_property("visible", False)
         page["/Grid"].set_property("visible", False)
-        upright = np.hypot(*(tip - extent.base)[:2]) < 0.1 * size
-        self.look_from(*extent.camera(tip + [0.3 * size if upright else -0.1 * size, 0.0, 0.0 if upright else 0.2 * size]))
         lines = geometry.PointsGeometry(extent.floor().T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=FLOOR_COLOUR)))
 

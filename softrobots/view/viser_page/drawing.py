@@ -62,9 +62,9 @@ class ViserDrawing:
         floor = extent.floor().reshape(-1, 2, 3)
         scene.add_line_segments("/floor", floor, rgb(appearance.FLOOR_COLOUR), thickness=1.0, thickness_units="screen")
 
-    def look_at(self, tip: FloatArray) -> None:
-        """Place the camera of browsers that connect later so that it sees a robot with its tip there, shape (3,) [m]."""
-        self._server.initial_camera.position, self._server.initial_camera.look_at = self._extent.camera(tip)
+    def look_at(self, tip: FloatArray, points: FloatArray) -> None:
+        """Place the camera of browsers that connect later; the arguments are those of `Extent.camera`."""
+        self._server.initial_camera.position, self._server.initial_camera.look_at = self._extent.camera(tip, points)
 
     def show(self, scene: Scene, *, rigid: bool, path: FloatArray | None) -> None:
         """Show a state, in one message.
