@@ -14,8 +14,8 @@ from softrobots.cli.options.robot_argument import add_model, add_motors, motors_
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.checks import FloatArray, unit_vector
 from softrobots.core.errors import NoCriticalLoad
-from softrobots.core.summary import aligned, formatted
-from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
+from softrobots.core.summary import text_of
+from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch, branch_parts
 from softrobots.statics.buckling.post_buckling import post_buckling_branches
 from softrobots.view.figures.equilibria import branches
 
@@ -64,7 +64,7 @@ def run(arguments: argparse.Namespace) -> bool:
         print_answer(arguments, answer, [f"no branches: {error}"], [])
         return False
     files = save(arguments, found) + write_plot(arguments, lambda: branches(found, _across(found, arguments.direction)))
-    print_answer(arguments, _answer(found), _lines(found), files)
+    print_answer(arguments, _answer(found), text_of(branch_parts(found), None), files)
     return True
 
 
@@ -80,24 +80,6 @@ def _answer(found: Sequence[EquilibriumBranch]) -> dict[str, Any]:
         for branch in found
     ]
     return {"branches": rows, "units": units}
-
-
-def _lines(found: Sequence[EquilibriumBranch]) -> list[str]:
-    """A table of the branches."""
-    head = ("branch", "starts at [N]", "forces [N]", "stable points", "tip at the end [m]", "ends at")
-    rows = [
-        (
-            branch.label,
-            formatted(branch.forces[0]),
-            f"{branch.forces.min():.6g} to {branch.forces.max():.6g}",
-            "neutral" if branch.neutral.all() else f"{np.count_nonzero(branch.stable)} of {len(branch.stable)}",
-            formatted(branch.equilibria[-1].tip_position.round(6)),
-            branch.ended,
-        )
-        for branch in found
-    ]
-    crossed = [f"{branch.label} is crossed at {formatted(branch.crossings)} N" for branch in found if branch.crossings.size]
-    return [*aligned([head, *rows]), "", *crossed]
 
 
 def _across(found: Sequence[EquilibriumBranch], direction: Any) -> FloatArray:

@@ -10,7 +10,8 @@ import numpy as np
 
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
-from softrobots.cli.reports.answers import Fact, add_json, answer_of, lines_of, print_answer
+from softrobots.cli.reports.answers import Fact, add_json, answer_of, print_answer
+from softrobots.core.summary import facts, text_of
 from softrobots.inflated_beam import BendingTest, fit_characterisation, moment_limits, read_characterisation
 from softrobots.view.figures.inflated_link import characterisation
 
@@ -58,22 +59,24 @@ def run(arguments: argparse.Namespace) -> None:
     data = read_characterisation(arguments.data, rig)
     fit = fit_characterisation(*data, **tube, angle_offset=arguments.angle_offset)
     limits = moment_limits(**tube)
-    facts = [
-        Fact("stiffness", fit.stiffness, "N m/rad", "stiffness k"),
-        Fact("stiffness_std", fit.stiffness_std, "N m/rad", "  standard error"),
-        Fact("stiffness_interval", np.array(fit.stiffness_interval), "N m/rad", "  interval of 95 %"),
-        Fact("angle_offset", fit.angle_offset, "rad", "zero error of the angle"),
-        Fact("angle_offset_std", fit.angle_offset_std, "rad", "  standard error"),
-        Fact("max_moment", fit.max_moment, "N m", "plateau M_max"),
-        Fact("mean_moment_above_wrinkling", fit.mean_moment_above_wrinkling, "N m", "mean above wrinkling"),
-        Fact("slack_moment", limits.slack, "N m", "first slack fibre at"),
-        Fact("wrinkling_moment", fit.wrinkling_moment, "N m", "wrinkling (3) at"),
-        Fact("collapse_moment", limits.collapse, "N m", "collapse at"),
-        Fact("n_linear", fit.n_linear, "-", "points on the slope"),
-        Fact("n_saturated", fit.n_saturated, "-", "points on the plateau"),
-        Fact("n_points", len(data.angle), "-", "points in all"),
+    answer = [
+        Fact("stiffness", fit.stiffness, "N m/rad"),
+        Fact("stiffness_std", fit.stiffness_std, "N m/rad"),
+        Fact("stiffness_interval", np.array(fit.stiffness_interval), "N m/rad"),
+        Fact("angle_offset", fit.angle_offset, "rad"),
+        Fact("angle_offset_std", fit.angle_offset_std, "rad"),
+        Fact("max_moment", fit.max_moment, "N m"),
+        Fact("mean_moment_above_wrinkling", fit.mean_moment_above_wrinkling, "N m"),
+        Fact("slack_moment", limits.slack, "N m"),
+        Fact("wrinkling_moment", fit.wrinkling_moment, "N m"),
+        Fact("collapse_moment", limits.collapse, "N m"),
+        Fact("n_linear", fit.n_linear, "-"),
+        Fact("n_saturated", fit.n_saturated, "-"),
+        Fact("n_points", len(data.angle), "-"),
     ]
     files = save(arguments, fit) + write_plot(arguments, lambda: characterisation(data, fit, **tube))
     use = f"--set stiffness={fit.stiffness:.6g}" + ("" if fit.max_moment is None else f" max_moment={fit.max_moment:.6g}")
-    lines = [*lines_of(facts), "", f"as a robot: softrobots solve inflatable_arm {use}"]
-    print_answer(arguments, answer_of(facts), lines, files)
+    others = [("first slack fibre at", f"{limits.slack:.6g} N m"), ("collapse at", f"{limits.collapse:.6g} N m")]
+    of_data = facts([*others, ("points in all", str(len(data.angle)))])
+    lines = f"{text_of([*fit.summary_parts(), of_data])}\n\nas a robot: softrobots solve inflatable_arm {use}"
+    print_answer(arguments, answer_of(answer), lines, files)

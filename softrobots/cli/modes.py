@@ -6,8 +6,6 @@ import argparse
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
 from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import (
@@ -21,10 +19,11 @@ from softrobots.cli.options.output_files import (
 )
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, one_or_each, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
-from softrobots.core.checks import FloatArray, positive_integer
+from softrobots.core.checks import positive_integer
 from softrobots.core.files import new_file
-from softrobots.core.summary import aligned
+from softrobots.core.summary import text_of
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
+from softrobots.dynamics.vibration_summary import modes_parts
 from softrobots.model.actuators import load_units
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.view.figures.vibrations import SWING, mode_shapes
@@ -91,7 +90,7 @@ def run(arguments: argparse.Namespace) -> None:
                 viewer.animate(modes.swing(mode, SWING * model.reach))
                 title = f"{model.pinocchio.name}, mode {mode}, {modes.frequencies[mode - 1]:.4g} Hz"
                 viewer.write_html(page, title=title, overwrite=arguments.overwrite)
-    print_answer(arguments, _answer(modes), _lines(modes, arguments.count), files + pages)
+    print_answer(arguments, _answer(modes), text_of(modes_parts(modes, arguments.count), None), files + pages)
 
 
 def _pages(arguments: argparse.Namespace, modes: int) -> list[Path]:
@@ -115,25 +114,3 @@ def _answer(modes: VibrationModes) -> dict[str, Any]:
     }
     springs, motors = modes.model.spring_joints, modes.model.motor_joints
     return {**{name: getattr(modes, name) for name in units}, "springs": springs, "motors": motors, "units": units}
-
-
-def _lines(modes: VibrationModes, count: int) -> list[str]:
-    """A table of the slowest modes."""
-    shown = min(count, len(modes.frequencies))
-    rows = [("mode", "frequency [Hz]", "damping ratio", "tip moves along", "effective mass x, y, z [kg]")]
-    for place in range(shown):
-        masses = "  ".join(f"{mass:.4f}" for mass in modes.effective_masses[place, :3])
-        numbers = f"{modes.frequencies[place]:.6g}", f"{modes.damping_ratios[place]:.4g}"
-        rows.append((str(place + 1), *numbers, _direction(modes.tip_shapes[:, place], modes.model.reach), masses))
-    left = len(modes.frequencies) - shown
-    more = [f"and {left} faster ones, up to {modes.frequencies[-1]:.6g} Hz"] if left else []
-    shaken = "  ".join(f"{mass:.4f}" for mass in modes.effective_masses.sum(axis=0)[:3])
-    return [*aligned(rows), *more, "", f"mass that shakes with the base along x, y, z, in all modes: {shaken} kg"]
-
-
-def _direction(moved: FloatArray, reach: float) -> str:
-    """Where the tip goes in a mode, as a unit vector, or that it turns only."""
-    size = float(np.linalg.norm(moved[:3]))
-    if size <= 1e-6 * reach * float(np.linalg.norm(moved[3:])):
-        return "nowhere: it turns"
-    return "  ".join(f"{part:6.3f}" for part in moved[:3].round(9) / size + 0.0)

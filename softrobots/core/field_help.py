@@ -9,7 +9,6 @@ import ast
 import dataclasses
 import functools
 import inspect
-import itertools
 import re
 import textwrap
 from typing import Any, TypeVar
@@ -21,7 +20,7 @@ _UNIT = re.compile(r"\[(?![^\]]*(?:\d{4}|paper))([^\[\]]*)\]")  # brackets that 
 
 @functools.cache
 def field_texts(cls: type) -> dict[str, str]:
-    """Return the text of each field of a class and its bases, by name; without source those in metadata."""
+    """Return the text of each field and property of a class and its bases, by name; without source those in metadata."""
     fields = getattr(cls, "__dataclass_fields__", {})
     texts = {name: field.metadata["facts"].description for name, field in fields.items() if "facts" in field.metadata}
     if fields and len(texts) == len(fields):
@@ -31,7 +30,10 @@ def field_texts(cls: type) -> dict[str, str]:
             (tree,) = ast.parse(textwrap.dedent(inspect.getsource(one))).body
         except (OSError, TypeError):  # built in, or without source
             continue
-        for line, text in itertools.pairwise(getattr(tree, "body", ())):
+        body = getattr(tree, "body", [])
+        for line, text in zip(body, [*body[1:], None], strict=False):
+            if isinstance(line, ast.FunctionDef):
+                texts[line.name] = ast.get_docstring(line) or ""
             if isinstance(line, ast.AnnAssign) and isinstance(text, ast.Expr) and isinstance(text.value, ast.Constant):
                 texts[ast.unparse(line.target)] = inspect.cleandoc(str(text.value.value))
     return texts

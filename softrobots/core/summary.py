@@ -100,9 +100,10 @@ def html_of(parts: Iterable[Part]) -> str:
 
 def formatted(value: Any) -> str:
     """Return numbers with six digits, truth values as yes or no, None and infinity as none, text as it is."""
+    value = value.item() if isinstance(value, np.ndarray | np.generic) and value.ndim == 0 else value
     if value is None or (isinstance(value, float) and math.isinf(value)):
         return "none"
-    if isinstance(value, bool | np.bool_):
+    if isinstance(value, bool):
         return "yes" if value else "no"
     if isinstance(value, str):
         return value
@@ -111,6 +112,8 @@ def formatted(value: Any) -> str:
 
 def described(value: Any) -> str | None:
     """Return a number, a text, a truth value, names or an array in a few words; None for anything else."""
+    if isinstance(value, tuple) and value and all(isinstance(one, float) for one in value):
+        value = np.array(value)
     if isinstance(value, Mapping) or (isinstance(value, tuple | list) and all(isinstance(one, str) for one in value)):
         shown = [*map(str, value)]
         return ", ".join([*shown[:_SHOWN], *([f"{len(shown) - _SHOWN} more"] if len(shown) > _SHOWN else [])]) or "none"
@@ -128,16 +131,21 @@ def described(value: Any) -> str | None:
     if value.ndim == 1 and 0 < value.size <= _SHOWN and np.isfinite(value).all():
         return formatted(value)
     numbers = value[np.isfinite(value)]
-    return f"{shape} numbers" + (f", {numbers.min():.4g} to {numbers.max():.4g}" if numbers.size else "")
+    ends = list(dict.fromkeys(f"{end:.4g}" for end in (numbers.min(), numbers.max()))) if numbers.size else []
+    return f"{shape} numbers" + (f", {' to '.join(ends)}" if ends else "")
 
 
 def field_facts(result: Any, *names: str) -> list[tuple[str, str]]:
     """Return attributes of these names (by default all fields) as facts, with the units that the texts of fields state."""
     rows = []
     for name in names or _field_names(result):
-        words, unit = described(getattr(result, name)), field_unit(type(result), name).strip("-")
-        if words is not None:
-            rows.append((name.replace("_", " "), words if words == "none" else f"{words} {unit}".strip()))
+        value, unit = getattr(result, name), field_unit(type(result), name)
+        inner = value if isinstance(value, Mapping) and any(isinstance(one, np.ndarray) for one in value.values()) else None
+        for key, one in {name: value}.items() if inner is None else inner.items():
+            words, unit = described(getattr(one, "name", one)), unit if inner is None else ""
+            if words is not None:
+                label = name if inner is None else f"{name} {key}"
+                rows.append((label.replace("_", " "), words if words == "none" else f"{words} {unit.strip('-')}".strip()))
     return rows
 
 
@@ -176,13 +184,16 @@ def brief(result: Any) -> str:
     words = []
     for name in _field_names(result):
         value = getattr(result, name)
+        value = value.item() if isinstance(value, np.ndarray) and value.ndim == 0 else value
         called = getattr(value, "name", None)
-        if isinstance(value, tuple) and value and not isinstance(value[0], float):
+        if type(value) is tuple and value and not isinstance(value[0], float):
             words.append(f"{len(value)} {name}")
         elif isinstance(value, bool | int | str | float):
             words.append(f"{name}={value:.6g}" if isinstance(value, float) else f"{name}={short(value)}")
         elif isinstance(called, str):
             words.append(f"{name}={short(called)}")
+    arrays = {name: getattr(result, name) for name in _field_names(result)} if not words else {}
+    words += [f"{name} {value.shape}" for name, value in arrays.items() if isinstance(value, np.ndarray)][:_SHOWN]
     return f"{type(result).__name__}({', '.join(words)})"
 
 

@@ -29,6 +29,7 @@ from softrobots.core.checks import (
     refuse_where,
 )
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Summarised
 from softrobots.dynamics.time_inputs import curve
 
 SHAPERS = ("zv", "zvd", "ei")
@@ -38,8 +39,8 @@ _NEGLIGIBLE = 0.005  # of the largest vibration that the bare path leaves in a m
 _MOST_SAMPLES = 100_000
 
 
-@dataclass(frozen=True, eq=False)
-class InputShaper:
+@dataclass(frozen=True, eq=False, repr=False)
+class InputShaper(Summarised):
     """Impulses that a motor path is convolved with; made by `input_shaper`."""
 
     times: FloatArray
@@ -53,8 +54,8 @@ class InputShaper:
         return float(self.times[-1])
 
 
-@dataclass(frozen=True, eq=False)
-class ShapedTrajectory:
+@dataclass(frozen=True, eq=False, repr=False)
+class ShapedTrajectory(Summarised):
     """A shaped motor path: a function of time that `softrobots.simulate` takes as `q_motors`, with samples for everything else.
 
     Before its first and after its last time the motors rest.

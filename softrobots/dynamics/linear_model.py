@@ -14,6 +14,7 @@ import numpy as np
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, read_only
 from softrobots.core.errors import MissingDependency, ParameterError
+from softrobots.core.summary import Part, Summarised, Table, facts
 from softrobots.dynamics.motor_torque import MOTORS
 from softrobots.dynamics.small_motion import SmallMotion, mass_factor, small_motion
 from softrobots.model.actuators import load_units
@@ -26,8 +27,8 @@ _TIP = ("tip_x", "tip_y", "tip_z", "tip_turn_x", "tip_turn_y", "tip_turn_z")
 _TIP_UNITS = ("m",) * 3 + ("rad",) * 3
 
 
-@dataclass(frozen=True, eq=False)
-class LinearModel:
+@dataclass(frozen=True, eq=False, repr=False)
+class LinearModel(Summarised):
     """A linear model of a robot; made by `linearize`. `A, B, C, D = linear`, and `control.ss(*linear)` takes it as it is."""
 
     equilibrium: Equilibrium
@@ -56,6 +57,14 @@ class LinearModel:
     `<motor>_rate`."""
     output_units: tuple[str, ...]
     """Unit of each."""
+
+    def summary_parts(self) -> list[Part]:
+        """Return how the motors are driven, then states, inputs and outputs with their units."""
+        parts: list[Part] = [facts([("robot", self.equilibrium.model.name), ("motors", self.motors)])]
+        for kind in ("state", "input", "output"):
+            names = zip(getattr(self, f"{kind}_names"), getattr(self, f"{kind}_units"), strict=True)
+            parts.append(Table([(kind, "unit"), *names]))
+        return parts
 
     def __iter__(self) -> Iterator[FloatArray]:
         """A, B, C, D."""

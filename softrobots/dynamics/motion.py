@@ -16,8 +16,8 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
 
 
-@dataclass(frozen=True, eq=False)
-class MotionEnergy:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionEnergy(Summarised):
     """Energies of a robot in motion, and what went in and out since the start, each shape (n,) [J]."""
 
     kinetic: FloatArray
@@ -41,8 +41,8 @@ class MotionEnergy:
         return read_only(total - total[0])
 
 
-@dataclass(frozen=True, eq=False)
-class MotionState:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionState(Summarised):
     """State of a robot in motion, from which `simulate` can start."""
 
     model: SoftModel

@@ -28,7 +28,9 @@ import numpy as np
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, one_each, positive_integer, positive_number, read_only
 from softrobots.core.errors import NeutralEquilibrium, ParameterError
+from softrobots.core.summary import Part, Summarised
 from softrobots.dynamics.small_motion import mass_factor, small_motion
+from softrobots.dynamics.vibration_summary import modes_parts
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import null_space
@@ -40,8 +42,8 @@ _SAME = 1e-7  # frequencies this close, relative, are one: robots are round but 
 _NO_MOTION = 1e-6  # of the largest motion of the tip
 
 
-@dataclass(frozen=True, eq=False)
-class VibrationModes:
+@dataclass(frozen=True, eq=False, repr=False)
+class VibrationModes(Summarised):
     """The vibration modes of an equilibrium, slowest first; made by `vibration_modes`, saved by `softrobots.save_result`.
 
     The sign of a mode is that with which the largest of the tip's ways along x, y and z is positive; if it only turns, of its
@@ -72,6 +74,10 @@ class VibrationModes:
     """Momentum per modal rate, and angular momentum about the world's origin, shape (6, n) [sqrt(kg), sqrt(kg) m]."""
     settings: dict[str, Any]
     """The arguments `damping_time`, `mass_damping`, `servo_stiffness` and `rotor_inertia`."""
+
+    def summary_parts(self) -> list[Part]:
+        """Return the slowest modes, and the mass that shakes with the base."""
+        return modes_parts(self)
 
     @property
     def model(self) -> SoftModel:

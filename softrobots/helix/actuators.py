@@ -29,6 +29,7 @@ from softrobots.core.checks import (
 from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path, csv_text, write_text
+from softrobots.core.summary import Summarised
 from softrobots.helix.shapes import HelixShape, checked_contraction, forward
 
 INTERPOLATIONS = ("linear", "pchip")
@@ -38,8 +39,8 @@ _COLUMNS = ("pressure_Pa", "contraction")
 _HALVINGS = 60  # of an interval of the table: past the last digit
 
 
-@dataclass(frozen=True, eq=False)
-class ActuatorTable:
+@dataclass(frozen=True, eq=False, repr=False)
+class ActuatorTable(Summarised):
     """Contraction of an actuator measured at some pressures: interpolated between them, an error outside their range.
 
     Raises:

@@ -15,6 +15,7 @@ from softrobots.core.checks import FloatArray, choice, finite_number, instance_o
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path, write_text
 from softrobots.core.json_text import read_json
+from softrobots.core.summary import Part, Summarised
 from softrobots.helix.contact import BoolArray, SelfContact, self_contact
 from softrobots.helix.shapes import HANDEDNESS, HelixShape, forward
 from softrobots.helix.tube import centre_length, length_for_turns
@@ -69,8 +70,8 @@ class DesignWarning(UserWarning):
         self.design = design
 
 
-@dataclass(frozen=True, eq=False)
-class HelixDesign:
+@dataclass(frozen=True, eq=False, repr=False)
+class HelixDesign(Summarised):
     """An actuator, a tube, the resulting helix, and its deviation from the requirement.
 
     Raises:
@@ -118,7 +119,7 @@ class HelixDesign:
             object.__setattr__(self, name, value)
         shape = forward(self.contraction, self.angle, self.diameter)
         if self.wish is not None and not (shape.radius(self.wish.path) > 0.0 and shape.pitch > 0.0):
-            raise ParameterError("wish", self.wish, f"None for a helix without radius or rise to compare it with: {shape}")
+            raise ParameterError("wish", self.wish, f"None for a helix without radius or rise to compare it with: {shape!r}")
         object.__setattr__(self, "shape", shape)
         object.__setattr__(self, "tube_length", float(length_for_turns(shape, self.angle, self.turns)))
         object.__setattr__(self, "contact", self_contact(shape, self.turns))
@@ -157,7 +158,7 @@ class HelixDesign:
         """Whether the tube is free of contact and the actuator within its limits."""
         return not self.faults
 
-    def summary(self) -> str:
+    def summary_parts(self) -> list[Part]:
         """Return a description, one fact a line; lengths in millimetres, angles in degrees."""
         shape, degrees = self.shape, math.degrees(self.angle)
         lines = [
@@ -178,9 +179,7 @@ class HelixDesign:
                 f"distance {deviation.distance:.4g}",
             ]
         lines += [f"CANNOT BE MADE: {fault}" for fault in self.faults]
-        return "\n".join(lines)
-
-    __str__ = summary
+        return ["\n".join(lines)]
 
     def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Save the design as JSON: numbers in SI units and radians, full precision.

@@ -49,6 +49,7 @@ from softrobots.core.checks import (
     refuse_where,
 )
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Summarised
 
 
 class GraspTest(NamedTuple):
@@ -93,8 +94,8 @@ PAPER_CYLINDER = GraspTest(
 assumption. The sensor between the halves measures up to 12 N, which the model reaches at 10.7 kPa (2 and 4 mm)."""
 
 
-@dataclass(frozen=True, eq=False)
-class GraspForce:
+@dataclass(frozen=True, eq=False, repr=False)
+class GraspForce(Summarised):
     """Result of `grasp_force`, with its arguments: read-only arrays of their common shape."""
 
     pressure: FloatArray

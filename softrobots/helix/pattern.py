@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, listed, positive_number, read_only
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Summarised
 from softrobots.helix.design import HelixDesign
 from softrobots.helix.shapes import HANDEDNESS, HelixShape, checked_actuator, forward, turning_sign
 from softrobots.helix.tube import turns
@@ -53,8 +54,8 @@ class SheetPoints:
     """Number of crossings of `y = 0` upwards minus those downwards [-]."""
 
 
-@dataclass(frozen=True, eq=False)
-class Pattern:
+@dataclass(frozen=True, eq=False, repr=False)
+class Pattern(Summarised):
     """Plan of the pinches, as returned by `pinch_pattern`; `write_template` draws it, `write_template_table` lists it."""
 
     contraction: float

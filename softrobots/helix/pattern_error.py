@@ -29,6 +29,7 @@ import numpy as np
 
 from softrobots.constant_curvature.screws import Screw
 from softrobots.core.checks import FloatArray, positive_integer, read_only
+from softrobots.core.summary import Summarised
 from softrobots.helix.paths import actuator_curvature_torsion
 from softrobots.helix.pattern import Pattern, checked_pattern
 from softrobots.helix.shapes import length_ratio, turning_sign
@@ -50,8 +51,8 @@ class DiscreteCentreLine(NamedTuple):
     """
 
 
-@dataclass(frozen=True)
-class ShapeError:
+@dataclass(frozen=True, repr=False)
+class ShapeError(Summarised):
     """Deviation of a pinched tube from the smooth helix."""
 
     largest: float

@@ -25,6 +25,7 @@ import numpy as np
 
 from softrobots.core.checks import LARGEST, FloatArray, choice, common_shape, finite_array, positive_array, read_only
 from softrobots.core.errors import ParameterError, StraightTube
+from softrobots.core.summary import Summarised
 
 PATHS = ("inner", "centre", "outer")
 """The actuator, the centre line of the tube, and the line opposite the actuator."""
@@ -42,8 +43,8 @@ _ROUNDING = 1e-12  # of a radius, as a share of the diameter
 _SMALLEST = LARGEST**-3  # radius or pitch [m]: `forward` returns none below it, and curvatures stay finite
 
 
-@dataclass(frozen=True, eq=False)
-class HelixShape:
+@dataclass(frozen=True, eq=False, repr=False)
+class HelixShape(Summarised):
     """Shape of a tube bent into a helix, or of several of them: three read-only arrays of one shape.
 
     Numbers and arrays are accepted; they are broadcast to their common shape.

@@ -24,6 +24,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, positive_number, read_only
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Summarised
 from softrobots.helix.paths import actuator_curvature_torsion
 from softrobots.helix.profiles import Profile, checked_profile, sample_positions
 from softrobots.helix.shapes import PATHS, turning_sign
@@ -33,8 +34,8 @@ _EVALUATIONS, _EVALUATIONS_PER_RAD = 500_000, 50  # several times what smooth tu
 _TIGHTEST, _LOOSEST = 1e-13, 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class BentTube:
+@dataclass(frozen=True, eq=False, repr=False)
+class BentTube(Summarised):
     """Bent tube sampled from base to tip, as returned by `bent_tube`; the arrays are read-only."""
 
     rest_positions: FloatArray

@@ -16,6 +16,7 @@ from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
 from softrobots.core.progress import with_progress
 from softrobots.core.result_file import KINDS, Kind, text
+from softrobots.core.summary import Part, Summarised, Table
 from softrobots.identification.fit import INTERRUPTED
 from softrobots.identification.identification import UNITS, Identification
 from softrobots.identification.identify import identify
@@ -23,8 +24,8 @@ from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 
 
-@dataclass(frozen=True, eq=False)
-class CrossValidation:
+@dataclass(frozen=True, eq=False, repr=False)
+class CrossValidation(Summarised):
     """Result of `cross_validate`; can be saved with `softrobots.save_result`."""
 
     sets: Mapping[str, tuple[str, ...]]
@@ -64,18 +65,15 @@ class CrossValidation:
         order = list(self.sets)
         return min(names, key=lambda name: (len(self.sets[name]), self.means[order.index(name)]))
 
-    def summary(self) -> str:
+    def summary_parts(self) -> list[Part]:
         """Return a table of the mean errors with their standard errors, and of the error on each family, a line a set."""
-        width = max(len("set"), *map(len, self.sets))
-        heads = ["parameters", "mean", "+-", *(family[-11:] for family in self.families)]
-        lines = [f"{'set':{width}}" + "".join(f"{head:>12}" for head in heads)]
+        rows: list[tuple[str, ...]] = [("set", "parameters", "mean", "+-", *self.families)]
         for row, (name, parameters) in enumerate(self.sets.items()):
             numbers = (self.means[row], self.standard_errors[row], *self.errors[row])
-            lines.append(f"{name:{width}}{len(parameters):12d}" + "".join(f"{number:12.4g}" for number in numbers))
-        lines.append(
-            f"errors in {self.unit} on the family left out; least: {self.least}; best within one standard error: {self.best}"
-        )
-        return "\n".join(lines)
+            rows.append((name, str(len(parameters)), *(f"{number:.4g}" for number in numbers)))
+        words = f"errors in {self.unit} on the family left out; "
+        words += f"least: {self.least}; best within one standard error: {self.best}"
+        return [Table(rows, right=range(1, len(rows[0]))), words]
 
 
 def cross_validate(

@@ -10,6 +10,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Part, Summarised, Table
 from softrobots.identification.fit import Fit
 from softrobots.identification.gauges import find_gauges
 from softrobots.identification.measurements import Measurements
@@ -71,7 +72,7 @@ class History(NamedTuple):
 
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
-class Identification:
+class Identification(Summarised):
     """Fitted parameters of a robot; returned by `softrobots.identify`, saved by `softrobots.save_result`."""
 
     model: SoftModel
@@ -152,8 +153,8 @@ class Identification:
         """Values in one line."""
         return f"Identification({', '.join(f'{name}={value:.6g}' for name, value in self.values.items())}: {self.message})"
 
-    def summary(self) -> str:
-        """Return values, intervals, errors and what cannot be told apart, as a table for a person."""
+    def summary_parts(self) -> list[Part]:
+        """Return values with their intervals, errors, and what cannot be told apart."""
         header: tuple[str, ...] = ("parameter", "unit", "start", "value", "95 % by rows", "95 % by blocks", "prior")
         rows, blocks = self.intervals, self.block_intervals
         table = [header] + [
@@ -168,18 +169,19 @@ class Identification:
             )
             for one, value in zip(self.parameters, self.solution.tolist(), strict=True)
         ]
-        lines = [f"{self.message}, {len(self.history.cost)} steps, loss {self.loss}", "", *_aligned(table), ""]
+        parts: list[Part] = [f"{self.message}, {len(self.history.cost)} steps, loss {self.loss}", Table(table)]
         for title, comparison in (("fitted", self.fitted), ("kept aside", self.validation)):
             if comparison is not None:
-                lines.append(f"root mean square errors, {comparison.n_counted} rows {title}:")
-                lines += _aligned([(f"  {key}", f"{error:.4g}", unit) for key, (error, unit) in comparison.errors.items()])
+                errors = [(f"  {key}", f"{error:.4g}", unit) for key, (error, unit) in comparison.errors.items()]
+                parts.append(Table(errors, head=False, title=f"root mean square errors, {comparison.n_counted} rows {title}:"))
+        lines = []
         if self.outliers:
             where = self.fitted.measurements.where
             lines.append(f"outliers ({len(self.outliers)} rows): {', '.join(map(where, self.outliers[:10]))}")
         if self.held:
             lines.append(f"combinations without effect, which kept their start: {self.held}")
         lines += [f"not told apart: {text}" for text in self.unidentifiable]
-        return "\n".join(lines)
+        return [*parts, "\n".join(lines)]
 
     def _intervals(self, uncertainty: Uncertainty) -> dict[str, tuple[float, float]]:
         ends = uncertainty.intervals(self.solution, [one.logarithmic for one in self.parameters])
@@ -245,8 +247,3 @@ def _comparison(measurements: Measurements, prediction: Any, counted: Mapping[st
 
 def _interval(ends: tuple[float, float] | None) -> str:
     return "" if ends is None else f"{ends[0]:.5g} .. {ends[1]:.5g}" if np.isfinite(ends).all() else "not determined"
-
-
-def _aligned(rows: list[tuple[str, ...]]) -> list[str]:
-    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
-    return ["  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows]

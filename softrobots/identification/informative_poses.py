@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
 from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.core.summary import Part, Summarised, Table
 from softrobots.identification.gauges import find_gauges
 from softrobots.identification.identify import prior_of
 from softrobots.identification.measurements import Measurements
@@ -26,8 +27,8 @@ _TIP = {"tip_position": 1e-3}  # measured where nothing is told, to 1 mm
 _DRAWS = 200  # random choices of which the median is told
 
 
-@dataclass(frozen=True, eq=False)
-class InformativePoses:
+@dataclass(frozen=True, eq=False, repr=False)
+class InformativePoses(Summarised):
     """Result of `informative_poses`."""
 
     names: tuple[str, ...]
@@ -48,15 +49,13 @@ class InformativePoses:
     """Half widths of the intervals, shape (P,), relative for logarithmic parameters: with the "chosen" poses, with as many at
     "random" and with "random, twice as many" (medians of 200 choices), and with "all" candidates."""
 
-    def summary(self) -> str:
+    def summary_parts(self) -> list[Part]:
         """Return a table of the half widths of the intervals, a line a parameter."""
-        width = max(map(len, self.names))
-        lines = [" " * width + "".join(f"{head:>24}" for head in self.margins)]
+        rows: list[tuple[str, ...]] = [("half width", *self.margins)]
         for one, name in enumerate(self.names):
             scale, unit = (100.0, "%") if self.logarithmic[one] else (1.0, self.units[one])
-            cells = (f"{scale * margin[one]:.3g} {unit}" for margin in self.margins.values())
-            lines.append(f"{name:{width}}" + "".join(f"{cell:>24}" for cell in cells))
-        return "\n".join(lines)
+            rows.append((name, *(f"{scale * margin[one]:.3g} {unit}" for margin in self.margins.values())))
+        return [Table(rows, right=range(1, len(rows[0])))]
 
 
 def informative_poses(

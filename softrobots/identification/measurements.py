@@ -17,6 +17,7 @@ from softrobots.core.checks import FloatArray, finite_array, instance_of, read_o
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path
 from softrobots.core.result_file import save_csv
+from softrobots.core.summary import Summarised
 from softrobots.identification.measured_robot import check_coordinates, frame_of, wrenches_on
 from softrobots.identification.measurement_checks import (
     TIP,
@@ -34,7 +35,7 @@ from softrobots.model.soft_model import SoftModel, check_model
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Measurements:
+class Measurements(Summarised):
     """Measured rows of a robot at rest, in the order in which they were recorded; can be saved with `softrobots.save_result`.
 
     Arrays have a row for each measurement and are read-only. `measurements[rows]` selects rows, `+` joins two of the same form.
@@ -236,7 +237,7 @@ class Measurements:
         forms = [each_row_of(lambda array: np.shape(array)[1:], one) for one in (mine, others)]
         if forms[0] != forms[1]:
             raise ParameterError(
-                "other", other, f"of the form of {self}: the same actuators, loads, quantities, std and markers"
+                "other", other, f"of the form of {self!r}: the same actuators, loads, quantities, std and markers"
             )
         return Measurements(**each_row_of(lambda *arrays: np.concatenate(arrays), mine, others))
 

@@ -11,6 +11,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Part, Summarised, Table
 from softrobots.dynamics.vibration import VibrationModes
 from softrobots.identification.derivatives.frequency_derivatives import frequency_slopes
 from softrobots.identification.friction_derivatives import friction_loads
@@ -27,8 +28,8 @@ from softrobots.statics.loads import check_no_contact
 from softrobots.statics.tip_force.force_search import OBSERVABLE
 
 
-@dataclass(frozen=True, eq=False)
-class Sensitivity:
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivity(Summarised):
     """Derivatives by P parameters at an equilibrium, exact; made by `softrobots.sensitivity`.
 
     Loads are constant in the world, actuators as commanded, elastic coordinates follow. Each derivative is computed when it is
@@ -51,6 +52,13 @@ class Sensitivity:
     def units(self) -> tuple[str, ...]:
         """Unit of each parameter."""
         return self.parameters.units
+
+    def summary_parts(self) -> list[Part]:
+        """Return the derivatives of the position of the tip, a line a parameter."""
+        rows: list[tuple[str, ...]] = [("parameter", "unit", "tip x [m per unit]", "y", "z")]
+        for name, unit, moved in zip(self.names, self.units, self.tip_position.T, strict=True):
+            rows.append((name, unit, *(f"{number:.4g}" for number in moved)))
+        return [Table(rows, right=(2, 3, 4))]
 
     @cached_property
     def q_springs(self) -> FloatArray:

@@ -12,6 +12,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, finite_array, finite_number, positive_number
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.result_file import KINDS, Kind, counts
+from softrobots.core.summary import Part, Summarised, facts, field_facts
 from softrobots.inflated_beam.beam import wrinkling_moment
 from softrobots.inflated_beam.fitted_line import FittedLine, student_quantile
 
@@ -22,8 +23,8 @@ _SIGNIFICANT = 12.0  # ratio F by which a plateau must reduce the sum of squares
 _BELOW = 0.995  # probability with which the mean moment past the knee must lie below the line
 
 
-@dataclass(frozen=True)
-class Characterisation:
+@dataclass(frozen=True, repr=False)
+class Characterisation(Summarised):
     """Result of `fit_characterisation`."""
 
     stiffness: float
@@ -47,6 +48,22 @@ class Characterisation:
     """Number of points in the fit of the slope."""
     n_saturated: int
     """Number of points in the mean `max_moment`; noise may put a point beside the knee into both."""
+
+    def summary_parts(self) -> list[Part]:
+        """Return stiffness, zero error, plateau and limits."""
+        labels = {
+            "stiffness": "stiffness k",
+            "stiffness_std": "  standard error",
+            "stiffness_interval": "  interval of 95 %",
+            "angle_offset": "zero error of the angle",
+            "angle_offset_std": "  standard error",
+            "max_moment": "plateau M_max",
+            "mean_moment_above_wrinkling": "mean above wrinkling",
+            "wrinkling_moment": "wrinkling (3) at",
+            "n_linear": "points on the slope",
+            "n_saturated": "points on the plateau",
+        }
+        return [facts((label, words) for label, (_, words) in zip(labels.values(), field_facts(self, *labels), strict=True))]
 
 
 def fit_characterisation(

@@ -13,6 +13,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, finite_number, positive_integer, read_only, unit_vector
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.core.summary import Part, Summarised, facts, field_facts
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.displacement_control import (
@@ -30,8 +31,8 @@ from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 
 
-@dataclass(frozen=True, eq=False)
-class ImposedDisplacement:
+@dataclass(frozen=True, eq=False, repr=False)
+class ImposedDisplacement(Summarised):
     """Equilibrium of a robot that a probe displaces; can be saved with `softrobots.save_result`."""
 
     probe: Probe
@@ -57,6 +58,12 @@ class ImposedDisplacement:
     """Error of the displacement [m]."""
     stable: bool
     """Certified: the tangent stiffness is positive definite on the motions of the springs that do not move the probe."""
+
+    def summary_parts(self) -> list[Part]:
+        """Return the equilibrium, then what the probe does."""
+        held = ("stable at this place", "yes, certified" if self.stable else "NO")
+        probe = field_facts(self, "displacement", "reaction", "force", "contact", "gap")
+        return [*self.equilibrium.summary_parts(), facts([*probe, held])]
 
     @property
     def model(self) -> SoftModel:

@@ -21,6 +21,7 @@ from eigenpy import LDLT
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.summary import Part, Summarised, facts, field_facts
 from softrobots.model.coordinates import Point
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
@@ -48,8 +49,8 @@ _ROUNDING = 1e-15  # of an eigenvalue, relative to the largest; measured: 1e-16 
 _LIGHT = 1e-13  # least eigenvalue of a mass matrix over its largest, in coordinates of equal stiffness; 2e-8 for those chains
 
 
-@dataclass(frozen=True, eq=False)
-class Stability:
+@dataclass(frozen=True, eq=False, repr=False)
+class Stability(Summarised):
     """What becomes of a small disturbance of an equilibrium at held motors, without damping."""
 
     kind: str
@@ -59,6 +60,10 @@ class Stability:
 
     Those of a stable equilibrium are its squared natural frequencies. Empty if the description has no masses.
     """
+
+    def summary_parts(self) -> list[Part]:
+        """Return the kind, and how fast a disturbance grows."""
+        return [facts(field_facts(self, "kind", "growth_rate"))]
 
     @property
     def growth_rate(self) -> float:

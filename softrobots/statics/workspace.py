@@ -14,11 +14,13 @@ from softrobots.core.checks import FloatArray, finite_array, positive_integer, r
 from softrobots.core.errors import NeutralEquilibrium, ParameterError
 from softrobots.core.npz_file import LARGEST
 from softrobots.core.progress import with_progress
+from softrobots.core.summary import Part, Summarised, Table, facts, field_facts
 from softrobots.environment.environment import Environment
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.contact.pressed_gaps import pressed_gaps
 from softrobots.statics.elastic_state import elastic_state, largest_residual
 from softrobots.statics.elastostatics import balanced_state
+from softrobots.statics.equilibrium_summary import loaded_robot
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import tip_motion
@@ -31,8 +33,8 @@ FIELDS = ("q_motors", "q_springs", "tip_positions", "manipulability")
 """Names of the arrays of a `Workspace`, one row a sample."""
 
 
-@dataclass(frozen=True, eq=False)
-class Workspace:
+@dataclass(frozen=True, eq=False, repr=False)
+class Workspace(Summarised):
     """Sampled reach of a robot under a load; can be saved with `softrobots.save_result`."""
 
     model: SoftModel
@@ -53,6 +55,15 @@ class Workspace:
     """
     refused: int
     """Number of samples without a shape (inconsistent muscle lengths) or without a stable equilibrium."""
+
+    def summary_parts(self) -> list[Part]:
+        """Return robot and load, what the tip reached, and the samples of the motors."""
+        model, rows = self.model, [("", "least", "largest", "")]
+        names, units = (*("tip x", "tip y", "tip z"), *model.motor_joints), ("m", "m", "m", *model.actuators.units)
+        columns = np.hstack([self.tip_positions, self.q_motors]).T
+        rows += [(n, f"{each.min():.6g}", f"{each.max():.6g}", u) for n, each, u in zip(names, columns, units, strict=True)]
+        counts = [("samples", f"{len(self.q_motors)}, {self.refused} refused"), *field_facts(self, "manipulability")]
+        return [loaded_robot(model, self.load), Table(rows, right=(1, 2)), facts(counts)]
 
 
 def sample_workspace(

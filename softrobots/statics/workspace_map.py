@@ -20,6 +20,7 @@ from softrobots.core.checks import (
     unit_vector,
 )
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Summarised
 from softrobots.inflated_beam import required_pressure
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state, largest_residual
@@ -110,8 +111,8 @@ def _centres(reach: float, cells: int) -> FloatArray:
     return np.concatenate([-half[::-1], half])
 
 
-@dataclass(frozen=True, eq=False)
-class WorkspaceMap:
+@dataclass(frozen=True, eq=False, repr=False)
+class WorkspaceMap(Summarised):
     """Reach, payload and required pressure of an arm; can be saved with `softrobots.save_result`.
 
     The first three axes of every array are those of the grid, `grid.shape`.

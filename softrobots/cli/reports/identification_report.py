@@ -47,7 +47,7 @@ def identification_answer(found: Identification, compared: CrossValidation | Non
 
 def identification_lines(found: Identification, compared: CrossValidation | None) -> list[str]:
     """The same for a person."""
-    lines = found.summary().splitlines()
+    lines = found.summary(None).split("\n")
     for title, one in (("fitted", found.fitted), ("kept aside", found.validation)):
         about_mean = {} if one is None else _about_mean(one)
         lines += [f"{key}, without the mean of {title} rows: {error:.4g} m" for key, error in about_mean.items()]
@@ -55,7 +55,7 @@ def identification_lines(found: Identification, compared: CrossValidation | None
     if found.robot is None:
         words = (f"--spring {joint}={stiffness:.6g},{rest:.6g}" for joint, (stiffness, rest) in _springs(found).items())
         lines += ["", f"its springs, as options of other commands: {' '.join(words)}"]
-    return [*lines, "", *compared.summary().splitlines()] if compared is not None else lines
+    return [*lines, "", *compared.summary(None).split("\n")] if compared is not None else lines
 
 
 def prediction_table(found: Identification) -> tuple[list[str], Iterator[list[Any]]]:

@@ -22,7 +22,7 @@ class Actuation:
 
     def __init__(self, model: SoftModel, unknowns: Unknowns) -> None:
         """Prepare the linear maps."""
-        self._model, self._chain, self._strains = model, unknowns.chain, list(unknowns.strains)
+        self.model, self._chain, self._strains = model, unknowns.chain, list(unknowns.strains)
         chain = unknowns.chain
         self._count = chain.n_motors
         self._plain = unknowns.n_constraints == 0 and len(self._strains) == len(chain.stiffness)
@@ -117,7 +117,7 @@ class Actuation:
         if self._tensions:
             bad |= ~np.all(motors[:, self._count :] >= self._least, axis=1)
         if self._lengths:
-            admitted = (np.all(np.isfinite(row)) and self._model.actuators.admit(row) for row in motors)
+            admitted = (np.all(np.isfinite(row)) and self.model.actuators.admit(row) for row in motors)
             bad |= ~np.fromiter(admitted, dtype=bool, count=len(motors))
         return bad
 
@@ -127,7 +127,7 @@ class Actuation:
         Raises:
             ParameterError: If they are invalid, or a motor position is too large to compute with.
         """
-        motors = self._model.checked_motors(q_motors, field)
+        motors = self.model.checked_motors(q_motors, field)
         if np.any(np.abs(motors[: self._count]) > LARGEST_POSITION):
             raise ParameterError(
                 field, q_motors, f"within +-{LARGEST_POSITION:g} rad or m at motor joints, for compiled solvers"
@@ -143,7 +143,7 @@ class Actuation:
         if self._plain:
             return elastic
         if self._held:
-            held: Any = self._model.structure.muscle_lengths
+            held: Any = self.model.structure.muscle_lengths
             return np.array([held.strains(q, y) for q, y in zip(motors, elastic, strict=True)]).reshape(-1, len(self._strains))
         strains = elastic @ self._chain.free.T
         if self._lengths:

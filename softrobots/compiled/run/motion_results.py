@@ -11,6 +11,7 @@ import numpy as np
 
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.summary import Summarised
 from softrobots.dynamics.motion import Motion, MotionEnergy
 
 
@@ -56,8 +57,8 @@ class StepEnd(NamedTuple):
     """The tip, shape (3,) [m], world axes."""
 
 
-@dataclass(frozen=True, eq=False)
-class MotionBatch:
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionBatch(Summarised):
     """Motions of many cases, at the same times."""
 
     time: FloatArray

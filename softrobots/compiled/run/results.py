@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from typing import Any
 
 import numpy as np
@@ -13,9 +13,10 @@ from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.result_file import TABLES
+from softrobots.core.summary import Part, Summarised, Table, facts, field_facts
 
 
-class CompiledEquilibrium:
+class CompiledEquilibrium(Summarised):
     """An equilibrium, certified stable or neutral.
 
     For motor torques, tangent stiffness, pictures or files pass its `q_springs` to
@@ -40,8 +41,24 @@ class CompiledEquilibrium:
         self.status = status
 
     def __repr__(self) -> str:
-        """Elastic coordinates and residual."""
-        return f"CompiledEquilibrium(q_springs={self.q_springs.tolist()}, residual={self.residual:.3g})"
+        """Status, residual and tip in a line."""
+        tip = ", ".join(f"{number:.6g}" for number in self.tip_position)
+        return f"{type(self).__name__}({self.status.name}, residual={self.residual:.3g}, tip at ({tip}) m)"
+
+    def summary_parts(self) -> list[Part]:
+        """Return actuators, springs, force, tip and certificate."""
+        model = self._actuation.model
+        numbers = [
+            (name, f"{value:.6f}", unit)
+            for names, values, units in (
+                (model.motor_joints, self.q_motors, model.actuators.units),
+                (model.spring_joints, self.q_springs, model.springs.units),
+            )
+            for name, value, unit in zip(names, values, units, strict=True)
+        ]
+        rows = field_facts(self, "force", "tip_position", "residual")
+        status = ("status", self.status.name.lower().replace("_", " "))
+        return [Table([(model.name, "position", ""), *numbers], right=(1,)), facts([*rows, status])]
 
     @property
     def stable(self) -> bool:
@@ -89,9 +106,9 @@ class CompiledLoadEstimate(CompiledEquilibrium):
 
     __slots__ = ()
 
-    def __repr__(self) -> str:
-        """The force."""
-        return f"CompiledLoadEstimate(force={self.force.tolist()})"
+    def summary_parts(self) -> list[Part]:
+        """Return the equilibrium under the force, what it leaves unexplained, and how well it is felt."""
+        return [*super().summary_parts(), facts(field_facts(self, "unexplained", "observability"))]
 
     @property
     def unexplained(self) -> float:
@@ -104,8 +121,8 @@ class CompiledLoadEstimate(CompiledEquilibrium):
         return self._root("observed")
 
 
-@dataclass(frozen=True, eq=False)
-class Batch:
+@dataclass(frozen=True, eq=False, repr=False)
+class Batch(Summarised):
     """Common results of all batches, one row a case."""
 
     q_springs: FloatArray
@@ -121,6 +138,11 @@ class Batch:
             if array is not None:
                 array.setflags(write=False)
 
+    def summary_parts(self) -> list[Part]:
+        """Return how many cases have which status, and the ranges of their numbers."""
+        counts = [(f"cases {status.name.lower().replace('_', ' ')}", str(number)) for status, number in self.counts().items()]
+        return [facts([*counts, *field_facts(self, *(one.name for one in fields(self) if one.name != "status"))])]
+
     @property
     def certified(self) -> Any:
         """Mask of the valid rows, shape (n,)."""
@@ -132,7 +154,7 @@ class Batch:
         return {Status(value): int(number) for value, number in zip(values.tolist(), numbers.tolist(), strict=True)}
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class EquilibriumBatch(Batch):
     """Equilibria of many cases."""
 
@@ -140,7 +162,7 @@ class EquilibriumBatch(Batch):
     """The loaded tip, shape (n, 3) [m], world axes."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class LoadBatch(Batch):
     """Forces that explain motor torques, of many cases."""
 
@@ -152,7 +174,7 @@ class LoadBatch(Batch):
     """Smallest singular value of the elastostatic Jacobian, shape (n,) [m]."""
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class MotorBatch(Batch):
     """Motors that put the loaded tip at targets: many independent ones, or the waypoints of a path."""
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -10,6 +11,7 @@ import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.summary import Part, Summarised, Table, formatted
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium
@@ -21,8 +23,8 @@ RING = "ring"
 """Label of a branch out of a ring; the others are the same robot, bent in another direction."""
 
 
-@dataclass(frozen=True, eq=False)
-class EquilibriumBranch:
+@dataclass(frozen=True, eq=False, repr=False)
+class EquilibriumBranch(Summarised):
     """A sequence of equilibria under a force that grows or falls."""
 
     label: str
@@ -63,3 +65,25 @@ class EquilibriumBranch:
     def neutral(self) -> Any:
         """Which are neutral, shape (n,), truth values: all of a ring, and the critical point itself."""
         return np.abs(self.softest) <= POSITIVE
+
+    def summary_parts(self) -> list[Part]:
+        """Return its forces, stability and end, and where it is crossed."""
+        return branch_parts([self])
+
+
+def branch_parts(found: Sequence[EquilibriumBranch]) -> list[Part]:
+    """Return a table of branches, and where they are crossed."""
+    head = ("branch", "starts at [N]", "forces [N]", "stable points", "tip at the end [m]", "ends at")
+    rows = [
+        (
+            branch.label,
+            formatted(branch.forces[0]),
+            f"{branch.forces.min():.6g} to {branch.forces.max():.6g}",
+            "neutral" if branch.neutral.all() else f"{np.count_nonzero(branch.stable)} of {len(branch.stable)}",
+            formatted(branch.equilibria[-1].tip_position.round(6)),
+            branch.ended,
+        )
+        for branch in found
+    ]
+    crossed = [f"{branch.label} is crossed at {formatted(branch.crossings)} N" for branch in found if branch.crossings.size]
+    return [Table([head, *rows]), "\n".join(crossed)]

@@ -8,6 +8,7 @@ from functools import cached_property
 import numpy as np
 
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.summary import Part, Summarised, Table, facts, formatted
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact import Contact
 from softrobots.statics.equilibrium_result import Equilibrium
@@ -62,8 +63,8 @@ class ContactJump:
         return f"{self.parameter:.6g}: jump of the tip by {self.distance:.4g} m, {self.energy_lost:.4g} J lost"
 
 
-@dataclass(frozen=True, eq=False)
-class ContactPath:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactPath(Summarised):
     """Equilibria in contact along a path, each reached from the last; can be saved with `softrobots.save_result`."""
 
     parameters: FloatArray
@@ -109,10 +110,14 @@ class ContactPath:
         steps = f"{len(self.equilibria)} equilibria, {span}, friction {self.friction:g}"
         return f"ContactPath({self.model.pinocchio.name}, {steps}, {happens})"
 
-    def summary(self) -> str:
-        """Return steps, events, jumps and work of friction, one a line."""
+    def summary_parts(self) -> list[Part]:
+        """Return steps, events, jumps, work of friction, and where the tip ends."""
         span = f"parameter {self.parameters[0]:.6g} to {self.parameters[-1]:.6g}"
-        lines = [f"{len(self.equilibria)} equilibria, {span}, friction coefficient {self.friction:g}"]
-        lines += [str(event) for event in self.events] + [str(jump) for jump in self.jumps]
-        lines.append(f"work of friction {self.dissipation[-1]:.6g} J")
-        return "\n".join([*lines, self.ended] if self.ended else lines)
+        happened = [*map(str, self.events), *map(str, self.jumps)]
+        ends = [
+            ("work of friction", f"{self.dissipation[-1]:.6g} J"),
+            ("tip at the end", f"{formatted(self.tip_positions[-1])} m"),
+            *([("ended", self.ended)] if self.ended else []),
+        ]
+        head = f"{self.model.name}, {len(self.equilibria)} equilibria, {span}, friction coefficient {self.friction:g}"
+        return [head, Table([(line,) for line in happened], head=False), facts(ends)]

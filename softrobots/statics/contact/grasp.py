@@ -34,6 +34,7 @@ from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, finite_array, one_each, read_only, refuse_where, unit_vector
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import Summarised
 from softrobots.statics.contact.cone_program import CLOSE, ConeProgram
 
 _RANK = 1e-9  # of the largest singular value
@@ -41,8 +42,8 @@ _OUTSIDE = 0.1 * CLOSE  # of the sum of the normal forces: what the friction tha
 _ON_CONE = 1e-6  # of the normal force: what the friction of a contact may lie outside by, and slips from
 
 
-@dataclass(frozen=True, eq=False)
-class ForceClosure:
+@dataclass(frozen=True, eq=False, repr=False)
+class ForceClosure(Summarised):
     """Result of `is_force_closure`; it counts as true if the grasp is closed."""
 
     closed: bool
@@ -61,8 +62,8 @@ class ForceClosure:
         return self.closed
 
 
-@dataclass(frozen=True, eq=False)
-class PullOut:
+@dataclass(frozen=True, eq=False, repr=False)
+class PullOut(Summarised):
     """Result of `pull_out_force`."""
 
     force: float

@@ -16,6 +16,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, one_each, positive_integer, read_only, unit_vector
 from softrobots.core.errors import LoadNotFound, NeutralEquilibrium, ParameterError
+from softrobots.core.summary import Summarised
 from softrobots.environment.capsules import capsule_tags
 from softrobots.model.loader import with_points
 from softrobots.model.soft_model import SoftModel, check_model
@@ -27,8 +28,8 @@ _SAME = 1e-9  # change of a direction that is none [-]
 _APART = 1e-6  # distance of ends of cores that are no joint, relative to the reach
 
 
-@dataclass(frozen=True, eq=False)
-class ContactPlace:
+@dataclass(frozen=True, eq=False, repr=False)
+class ContactPlace(Summarised):
     """A place where something may touch a robot; made by `locate_contact`."""
 
     link: str
