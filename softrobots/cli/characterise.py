@@ -11,7 +11,7 @@ import numpy as np
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.reports.answers import Fact, add_json, answer_of, print_answer
-from softrobots.core.summary import facts, text_of
+from softrobots.core.summary import facts
 from softrobots.inflated_beam import BendingTest, fit_characterisation, moment_limits, read_characterisation
 from softrobots.view.figures.inflated_link import characterisation
 
@@ -77,6 +77,6 @@ def run(arguments: argparse.Namespace) -> None:
     files = save(arguments, fit) + write_plot(arguments, lambda: characterisation(data, fit, **tube))
     use = f"--set stiffness={fit.stiffness:.6g}" + ("" if fit.max_moment is None else f" max_moment={fit.max_moment:.6g}")
     others = [("first slack fibre at", f"{limits.slack:.6g} N m"), ("collapse at", f"{limits.collapse:.6g} N m")]
-    of_data = facts([*others, ("points in all", str(len(data.angle)))])
-    lines = f"{text_of([*fit.summary_parts(), of_data])}\n\nas a robot: softrobots solve inflatable_arm {use}"
+    table = facts([*fit.summary_facts(), *others, ("points in all", str(len(data.angle)))])
+    lines = f"{table.text()}\n\nas a robot: softrobots solve inflatable_arm {use}"
     print_answer(arguments, answer_of(answer), lines, files)

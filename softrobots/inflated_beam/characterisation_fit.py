@@ -49,8 +49,8 @@ class Characterisation(Summarised):
     n_saturated: int
     """Number of points in the mean `max_moment`; noise may put a point beside the knee into both."""
 
-    def summary_parts(self) -> list[Part]:
-        """Return stiffness, zero error, plateau and limits."""
+    def summary_facts(self) -> list[tuple[str, str]]:
+        """Return stiffness, zero error, plateau and limits, each with what it is."""
         labels = {
             "stiffness": "stiffness k",
             "stiffness_std": "  standard error",
@@ -59,11 +59,15 @@ class Characterisation(Summarised):
             "angle_offset_std": "  standard error",
             "max_moment": "plateau M_max",
             "mean_moment_above_wrinkling": "mean above wrinkling",
-            "wrinkling_moment": "wrinkling (3) at",
             "n_linear": "points on the slope",
             "n_saturated": "points on the plateau",
+            "wrinkling_moment": "wrinkling (3) at",
         }
-        return [facts((label, words) for label, (_, words) in zip(labels.values(), field_facts(self, *labels), strict=True))]
+        return [(label, words) for label, (_, words) in zip(labels.values(), field_facts(self, *labels), strict=True)]
+
+    def summary_parts(self) -> list[Part]:
+        """Return them as a table."""
+        return [facts(self.summary_facts())]
 
 
 def fit_characterisation(

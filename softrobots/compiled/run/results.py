@@ -41,9 +41,10 @@ class CompiledEquilibrium(Summarised):
         self.status = status
 
     def __repr__(self) -> str:
-        """Status, residual and tip in a line."""
-        tip = ", ".join(f"{number:.6g}" for number in self.tip_position)
-        return f"{type(self).__name__}({self.status.name}, residual={self.residual:.3g}, tip at ({tip}) m)"
+        """Status, residual, force and tip in a line."""
+        force, tip = (", ".join(f"{number:.6g}" for number in vector) for vector in (self.force, self.tip_position))
+        status = f"{self.status.name}, residual={self.residual:.3g}"
+        return f"{type(self).__name__}({status}, force ({force}) N, tip at ({tip}) m)"
 
     def summary_parts(self) -> list[Part]:
         """Return actuators, springs, force, tip and certificate."""
