@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import re
 import subprocess
 import sys
 from concurrent.futures import ThreadPoolExecutor
@@ -717,7 +718,9 @@ def test_what_is_printed(plain: CompiledModel) -> None:
     assert "settle_batch" in plain.source(lanes=True)
     assert text == sr.compile(plain.model, backend="python").source()
     found = plain.equilibrium((0.1, 0.2, 0.3), (1.0, 2.0, 3.0))
-    assert str(found.q_springs.tolist()) in repr(found)
+    assert "CERTIFIED" in repr(found)
+    for name, value in zip(plain.model.spring_joints, found.q_springs, strict=True):
+        assert re.search(rf"^{name} +{value:.6f}  rad$", str(found), re.M)
     for part in (found.q_springs, found.q_motors, found.force, found.tip_position):
         assert not part.flags.writeable
     assert {one.explanation for one in Status} >= {"certified stable"}

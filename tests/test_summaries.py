@@ -200,7 +200,18 @@ def test_a_long_table_is_cut_unless_all_is_asked_for() -> None:
     assert len(read(html_of([table])).rows) == MOST_ROWS + 2
 
 
-HELPED = (sr.InflatableArm, sr.PccArm, sr.TendonArm, sr.HelixTube, sr.Route, sr.Equilibrium, sr.LinkLimits, sr.Motion)
+ROBOTS = (sr.InflatableArm, sr.PccArm, sr.TendonArm, sr.HelixTube, sr.Route)
+RESULTS = (
+    sr.Equilibrium,
+    sr.LinkLimits,
+    sr.IkSolution,
+    sr.Trajectory,
+    sr.LoadEstimate,
+    sr.Motion,
+    sr.VibrationModes,
+    sr.Workspace,
+)
+HELPED = (*ROBOTS, *RESULTS, sr.LinearModel, sr.Measurements, sr.Identification, sr.SoftModel, sr.helix.HelixDesign)
 
 
 @pytest.mark.parametrize("kind", HELPED)
@@ -219,6 +230,6 @@ def test_help_tells_every_field_with_its_unit(kind: Any) -> None:
             assert repr(field.default) in entry
         else:
             (text,) = re.findall(rf'^    {field.name}: [^\n]*\n    r?"""(.*?)"""', source, re.M | re.S)
-            assert entry.startswith(" ".join(text.split())[:60])
+            assert " ".join(entry.split()).startswith(" ".join(text.split())[:60])
     for name in getattr(kind, "_fields", ()):
         assert f" {name}: " in shown

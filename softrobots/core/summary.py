@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from html import escape
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,6 +44,8 @@ class Table(NamedTuple):
 
     def html(self) -> str:
         """Return the table as HTML."""
+        from html import escape  # a millisecond, which only notebooks need
+
         lines = []
         for number, row in enumerate(self.rows):
             cells = []
@@ -90,6 +91,8 @@ def text_of(parts: Iterable[Part], rows: int | None = MOST_ROWS) -> str:
 
 def html_of(parts: Iterable[Part]) -> str:
     """Return parts as HTML for a notebook, without scripts, and with names escaped."""
+    from html import escape
+
     blocks = [
         f"<p>{escape(part).replace(chr(10), '<br>')}</p>" if isinstance(part, str) else part.shortened(MOST_ROWS).html()
         for part in parts
