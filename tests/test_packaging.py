@@ -42,10 +42,10 @@ ShapedTrajectory SoftModel SoftRobotsError Sphere SpringGroup Stability Straight
 VibrationModes Viewer ViewerError Workspace __version__ capsule_error compliance constant_curvature contact_sensitivity
 contact_wrench critical_load cross_validate damping_time_from_decrement distributed_force elastostatic_jacobian estimate_load
 export follow_contact follow_trajectory grown_coordinates helix identify inflated_beam informative_poses input_shaper
-is_force_closure linearize load_model load_result locate_contact measured_decay mount plot post_buckling_branches pull_out_force
-quintic read_waypoints residual_vibration ring_down sample_workspace save_csv save_result sensitivity shape_input simulate
-solve_equilibrium solve_ik solve_imposed_displacement straight_line to_dataframe vibration_modes view waypoints
-with_points with_springs
+interactive is_force_closure linearize load_model load_result locate_contact measured_decay mount plot post_buckling_branches
+pull_out_force quintic read_waypoints residual_vibration ring_down sample_workspace save_csv save_result sensitivity
+shape_input simulate solve_equilibrium solve_ik solve_imposed_displacement straight_line to_dataframe vibration_modes view
+waypoints with_points with_springs write_interactive
 """
 """What users import from `softrobots`: a name is added here on purpose, and none disappears unnoticed."""
 
@@ -104,7 +104,8 @@ ROOMS = {
     "jax": "core learning",
     "torch": "core learning",
     "export": "core inflated_beam constant_curvature description robots model environment statics dynamics",
-    "view": "core inflated_beam constant_curvature helix description robots model environment statics dynamics identification",
+    "view": "core inflated_beam constant_curvature helix description robots model environment statics dynamics identification"
+    " compiled",
     "cli": "core inflated_beam constant_curvature helix description robots model environment statics dynamics identification"
     " compiled export view",
 }

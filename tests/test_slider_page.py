@@ -23,8 +23,8 @@ from softrobots.view.mesh_triangles import triangles
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 from softrobots.view.slider_page import SliderPage
+from softrobots.view.slider_ranges import slider_grid
 from softrobots.view.tension_scale import round_down, round_up, scale_end, tension_colour
-from softrobots.view.viser_page.slider_panel import slider_grid
 from tests.conftest import PATIENCE
 from tests.support.pictures import listening, pixels
 

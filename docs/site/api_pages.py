@@ -146,6 +146,8 @@ PAGES = {
             *_top(
                 "view",
                 "Viewer",
+                "write_interactive",
+                "interactive",
                 "view.written_page.WrittenPage",
                 "view.served_page.ServedPage",
                 "view.meshcat_page.page_text.InlinePage",

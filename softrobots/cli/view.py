@@ -11,12 +11,12 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from softrobots.cli.options.command_line import add_numbers, address_lines
-from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
+from softrobots.cli.options.command_line import address_lines
+from softrobots.cli.options.load_argument import loads_of
 from softrobots.cli.options.output_files import check_ending
-from softrobots.cli.options.robot_argument import add_model, add_motors, model_of, motors_of, source_of
+from softrobots.cli.options.robot_argument import model_of, motors_of, source_of
+from softrobots.cli.options.view_options import EXAMPLES, add_view_options, refuse_contradictions
 from softrobots.cli.reports.answers import add_json, print_answer
-from softrobots.core.checks import finite_number
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import new_file
 from softrobots.core.result_file import load_result
@@ -39,32 +39,6 @@ from softrobots.view.live.loop import LiveView, follow, state_line, tip_force
 from softrobots.view.served_page import ServedPage
 from softrobots.view.viewer import Viewer, view
 
-_EXAMPLES = """examples:
-  softrobots view inflatable_arm --motors 0.3 0.6 -0.8 --force 0 10 -15
-  softrobots view inflatable_arm --target 0.9 0.3 0.2 --gravity --live keyboard
-  softrobots view pcc_arm --live wanted.json                   follows a file, e.g. {"force": [0, 5, 0], "gravity": true}
-  softrobots view pcc_arm --sliders
-  softrobots view helix_tube --growth --html growth.html
-  softrobots view --result trajectory.npz --picture end.png --at 1
-  softrobots view --result branches.npz --branch=+spring_1_up
-"""
-
-_NOT_WITH = {
-    "--result": ("ROBOT", "--set", "--parameters", "--spring", "--tip", "--motors", "--target", "--growth", "a load"),
-    "--growth": ("--motors", "--target", "a load", "--live", "--sliders"),
-    "--html": ("--live", "--sliders", "--open", "--port"),
-    "--picture": ("--live", "--sliders", "--open", "--port"),
-    "--sliders": ("--live",),
-    "--live": ("--json",),
-}
-_SWITCHES = "motors target result branch growth live sliders html picture at speed overwrite open port json"
-_ONLY_WITH = {
-    "--branch": ("--result",),
-    "--speed": ("--result",),
-    "--overwrite": ("--html", "--picture"),
-    "--at": ("--picture",),
-}
-
 
 def add_parser(subparsers: Any) -> None:
     """Add the subcommand."""
@@ -73,45 +47,19 @@ def add_parser(subparsers: Any) -> None:
         help="show a robot in the browser",
         description="Show a robot in the browser, served on this machine only, until Ctrl-C: loaded, at a target, as a saved "
         "result, growing, or following commands. Or write the page, which works offline, or a picture of it.",
-        epilog=_EXAMPLES,
+        epilog=EXAMPLES,
     )
-    add_model(parser, optional=True)
-    help_text = "motor joints, then muscles, base to tip [rad, m, N or Pa]; with --target, where the search starts (relaxed)"
-    add_motors(parser, help_text)
-    add_loads(parser)
-    add_environment(parser)
-    add_numbers(parser, "--target", "X Y Z", "move the loaded tip to this position by inverse kinematics [m] (no target)")
-    help_text = (
-        "show a saved result, e.g. of `softrobots solve -o`, `ik -o`, `modes -o` or `simulate -o`, in place of ROBOT (none)"
-    )
-    parser.add_argument("--result", type=Path, metavar="FILE.npz", help=help_text)
-    help_text = "the branch of a --result of `softrobots branches`, as --branch=LABEL: its last stable point (its only one)"
-    parser.add_argument("--branch", metavar="LABEL", help=help_text)
-    parser.add_argument("--growth", action="store_true", help="show how a helical tube grows, without load")
-    help_text = (
-        "follow commands (none): `keyboard`, single keys of a terminal or lines of a pipe (? lists them), or a watched file"
-    )
-    parser.add_argument("--live", metavar="keyboard|FILE", help=help_text)
-    parser.add_argument(
-        "--sliders", action="store_true", help="a page with sliders for motors and load (needs viser, extra viser)"
-    )
-    parser.add_argument("--html", type=Path, metavar="FILE", help="write the page instead of serving it (served)")
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="take a picture of the page with Chromium (served)")
-    add_numbers(parser, "--at", "SHARE", "where --picture stops an animation, from 0, its start, to 1, its end [-] (0)")
-    add_numbers(parser, "--speed", "S", "how fast a trajectory or motion is played, relative to real time [-] (1)")
-    parser.add_argument("--overwrite", action="store_true", help="allow --html and --picture to replace files")
-    parser.add_argument("--open", action="store_true", help="open the page in the browser of this machine")
-    parser.add_argument("--port", type=int, metavar="N", help="port of the page (the first free one from 7000; sliders: 8080)")
+    add_view_options(parser)
     add_json(parser)
     parser.set_defaults(run=run)
 
 
 def run(arguments: argparse.Namespace) -> None:
     """Show the robot until Ctrl-C, or write a page or a picture."""
-    _refuse_contradictions(arguments)
+    refuse_contradictions(arguments)
     if arguments.picture is not None:
         check_ending("--picture", arguments.picture, ".png")
-    for file in (arguments.html, arguments.picture):
+    for file in (arguments.html, arguments.picture, arguments.interactive):
         if file is not None:
             new_file(file, overwrite=arguments.overwrite)  # refused before the work
     if arguments.picture is not None:
@@ -121,10 +69,9 @@ def run(arguments: argparse.Namespace) -> None:
         return
     result = _result(arguments)
     if isinstance(result, Movement):
-        if arguments.live is not None or arguments.sliders:
-            raise ParameterError(
-                "--result", str(arguments.result), "nothing that moves with --live or --sliders, which move the robot"
-            )
+        if arguments.live is not None or arguments.sliders or arguments.interactive is not None:
+            given = "nothing that moves with --live, --sliders or --interactive, which move the robot"
+            raise ParameterError("--result", str(arguments.result), given)
         with Viewer(result.model, port=arguments.port) as viewer:
             viewer.animate(result, speed=arguments.speed)
             _show(arguments, viewer, result.model, _words(result))
@@ -134,6 +81,9 @@ def run(arguments: argparse.Namespace) -> None:
     equilibrium = result.equilibrium if isinstance(result, IkSolution) else result
     if arguments.live is not None or arguments.sliders:
         tip_force(equilibrium)  # refused before the work
+    if arguments.interactive is not None:
+        _write_interactive(arguments, equilibrium)
+        return
     if arguments.sliders:
         _slide(arguments, equilibrium)
         return
@@ -221,6 +171,26 @@ def _slide(arguments: argparse.Namespace, equilibrium: Equilibrium) -> None:
         _serve(arguments, page, state_line(equilibrium))
 
 
+def _write_interactive(arguments: argparse.Namespace, equilibrium: Equilibrium) -> None:
+    """Write the page that solves by itself, with an equilibrium as its first pose."""
+    from softrobots.view.interactive_page import write_interactive
+
+    load = equilibrium.load
+    if load.environment is not None:
+        raise ParameterError(
+            "--environment", str(arguments.environment), "left out with --interactive: its page has no obstacles"
+        )
+    page = write_interactive(
+        equilibrium.model,
+        arguments.interactive,
+        q_motors=equilibrium.q_motors,
+        force=tip_force(equilibrium),
+        gravity=load.gravity,
+        overwrite=arguments.overwrite,
+    )
+    print_answer(arguments, {"files": [page]}, [state_line(equilibrium), f"{page}: written"])
+
+
 def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, state: str) -> None:
     """Serve a page, or write it and take its picture."""
     if arguments.html is None and arguments.picture is None:
@@ -265,29 +235,3 @@ def _print_line(line: str) -> None:
 def _print_error(line: str) -> None:
     sys.stderr.write(f"{line}\n")
     sys.stderr.flush()
-
-
-def _refuse_contradictions(arguments: argparse.Namespace) -> None:
-    """Refuse options that contradict each other, and values out of range."""
-    given = {
-        "ROBOT": arguments.robot is not None,
-        "--set": bool(arguments.parameters),
-        "--parameters": arguments.parameter_file is not None,
-        "--spring": bool(arguments.spring),
-        "--tip": arguments.tip is not None,
-        "a load": any(arguments.force) or bool(arguments.wrench) or (arguments.moment, arguments.gravity) != (None, None),
-        **{f"--{name}": getattr(arguments, name) not in (None, False) for name in _SWITCHES.split()},
-    }
-    if not given["ROBOT"] and not given["--result"]:
-        raise ParameterError("ROBOT", "(nothing)", "a robot or a file, or a saved --result given instead")
-    for option, others in _NOT_WITH.items():
-        both = [other for other in others if given[option] and given[other]]
-        if both:
-            raise ParameterError(option, "given", f"given without {', '.join(both)}")
-    for option, others in _ONLY_WITH.items():
-        if given[option] and not any(given[other] for other in others):
-            raise ParameterError(option, "given", f"given together with {' or '.join(others)}")
-    if arguments.at is not None and not 0.0 <= finite_number("--at", arguments.at) <= 1.0:
-        raise ParameterError("--at", arguments.at, "from 0 to 1")
-    if arguments.port is not None and not 0 < arguments.port < 65536:
-        raise ParameterError("--port", arguments.port, "from 1 to 65535")

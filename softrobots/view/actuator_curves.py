@@ -78,20 +78,27 @@ def actuator_curves(sections: BentSections, actuators: tuple[ActuatorTag, ...], 
         A curve for each actuator.
     """
     curves = []
-    starts = [_start(tag) for tag in actuators]
-    for number, tag in enumerate(actuators):
+    for tag, (radius, aside) in zip(actuators, thickness_and_shift(sections, actuators), strict=True):
         places = [route_places(sections, route, points) for route in tag.route]
         frames = np.concatenate([sections.frames(route.segment, at) for route, at in zip(tag.route, places, strict=True)])
         distance, azimuth = np.concatenate([offsets(route, at) for route, at in zip(tag.route, places, strict=True)], axis=1)
-        away, radius = outwards(frames, azimuth), _radius(tag, sections)
+        away = outwards(frames, azimuth)
         curve = frames[:, :3, 3] + distance[:, None] * away
         steps = np.linalg.norm(np.diff(curve, axis=0), axis=1)
         kept = np.append(True, steps > _SAME * steps.sum())
-        together, before = starts.count(starts[number]), starts[:number].count(starts[number])
-        gap = min(_GAP * radius, tag.distance / max(together - 1, 1))
-        shown = curve + (before - 0.5 * (together - 1)) * gap * np.cross(away, frames[:, :3, 2])
+        shown = curve + aside * np.cross(away, frames[:, :3, 2])
         curves.append(ActuatorCurve(tag.name, curve[kept], away[kept], radius, shown[kept]))
     return tuple(curves)
+
+
+def thickness_and_shift(sections: BentSections, actuators: tuple[ActuatorTag, ...]) -> list[tuple[float, float]]:
+    """Return the radius of each drawn actuator, and how far it is drawn beside others through the same holes [m]."""
+    starts, found = [_start(tag) for tag in actuators], []
+    for number, tag in enumerate(actuators):
+        radius, together, before = _radius(tag, sections), starts.count(starts[number]), starts[:number].count(starts[number])
+        gap = min(_GAP * radius, tag.distance / max(together - 1, 1))
+        found.append((radius, (before - 0.5 * (together - 1)) * gap))
+    return found
 
 
 def route_places(sections: BentSections, route: RouteTag, points: int) -> FloatArray:

@@ -81,6 +81,8 @@ class RobotShapes:
                 shapes.append(Shape(unique, geometry, colour, links[place], moved, unique.startswith(sections), place))
         self.shapes = tuple(shapes)
         """Every shape."""
+        self.joints = tuple(int(self._geometry.geometryObjects[shape.place].parentJoint) for shape in shapes)
+        """Number of the joint of Pinocchio's model that moves each of them; 0: none."""
 
     def transforms(self, q: FloatArray) -> list[FloatArray]:
         """Return the pose of each of `shapes` in the world at a configuration, each of shape (4, 4) [m]."""

@@ -9,23 +9,20 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, positive_number
-from softrobots.core.errors import NeutralEquilibrium, NotConverged, ParameterError, ViewerError
+from softrobots.core.errors import ParameterError, ViewerError
 from softrobots.environment.environment import Environment
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.loads import EARTH_GRAVITY
-from softrobots.statics.sensitivity import compliance
 from softrobots.view.legend import legend
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.served_page import LOOPBACK, ServedPage
-from softrobots.view.tension_scale import round_down
+from softrobots.view.slider_ranges import visible_force
 from softrobots.view.viser_page.drawing import ViserDrawing
 from softrobots.view.viser_page.server import start_server
 from softrobots.view.viser_page.slider_panel import Setting, SliderPanel
 from softrobots.view.warm_start import next_equilibrium
 
-_BENDING = 0.25  # linear deflection of the relaxed tip under the largest force, of the robot's size
-_ANY_FORCE = 10.0  # [N], the largest force on a robot that does not bend
 _TRAIL = 2000  # most points of the path of the tip
 
 
@@ -72,7 +69,7 @@ class SliderPage(ServedPage):
         push = finite_array("force", (0.0, 0.0, 0.0) if force is None else force, (3,), "N")
         self._gravity = finite_array("gravity", EARTH_GRAVITY if gravity is None else gravity, (3,), "m/s^2")
         self._environment = environment
-        self._full = _visible_force(model) if full_force is None else positive_number("full_force", full_force, "N")
+        self._full = visible_force(model) if full_force is None else positive_number("full_force", full_force, "N")
         if full_force is None:
             self._full = max(self._full, float(np.abs(push).max()))
         self._start = Setting(self._checked_motors(motors), self._checked_force(push), gravity is not None)
@@ -219,16 +216,3 @@ def _fitting(model: SoftModel, last: tuple[float, ...], values: tuple[float, ...
     moved = change != 0.0
     step = basis @ np.linalg.lstsq(basis[moved], change[moved], rcond=None)[0]
     return tuple(model.actuators.go(here, step).tolist())
-
-
-def _visible_force(model: SoftModel) -> float:
-    """A round force that moves the tip of the relaxed robot by a part of its size in its most compliant direction [N]."""
-    try:
-        relaxed = solve_equilibrium(model, model.relaxed_motors)
-        largest = float(np.linalg.eigvalsh(compliance(model, relaxed)[:3, :3])[-1])
-    except (NeutralEquilibrium, NotConverged):
-        return _ANY_FORCE
-    force = _BENDING * model.reach / max(largest, 1e-300)
-    if not 1e-6 < force < 1e6:
-        return _ANY_FORCE
-    return round_down(force)

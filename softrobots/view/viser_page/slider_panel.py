@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import html
-import math
 from collections.abc import Callable, Sequence
 from typing import Any, NamedTuple
 
@@ -13,11 +12,9 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.view.legend import LegendEntry
 from softrobots.view.meshcat_page.page_text import legend_rows
-from softrobots.view.tension_scale import round_down
+from softrobots.view.slider_ranges import actuator_ends, slider_grid
 
-_STEPS = 400  # least number of steps of a slider
 _LISTED = 6  # most inflated links that are listed one by one
-_AROUND = {"rad": math.pi, "m": 1.0, "N": 100.0, "Pa": 1e5}  # half the range of an actuator without limits, by its unit
 
 _STYLE = (
     "<style>#softrobots-panel{font:13px/1.5 sans-serif;padding:0 1em .5em} #softrobots-note{font-weight:bold;color:#8b0000}"
@@ -52,8 +49,7 @@ class SliderPanel:
         """
         self._gui, self._changed = gui, changed
         self._reset = False
-        limits = zip(model.motor_limits.tolist(), model.actuators.units, model.relaxed_motors.tolist(), strict=True)
-        ends = [_ends(low, high, unit, relaxed) for (low, high), unit, relaxed in limits]
+        ends = actuator_ends(model)
         with gui.add_folder("actuators" if model.n_motors == len(model.muscles) > 0 else "motors", visible=model.n_motors > 0):
             rows = zip(model.motor_joints, model.actuators.units, ends, start.q_motors, strict=True)
             self._motors = [self._slider(name, unit, *between, value) for name, unit, between, value in rows]
@@ -126,38 +122,6 @@ class SliderPanel:
     async def _pressed(self, _: Any) -> None:
         self._reset = True
         self._changed()
-
-
-def slider_grid(low: float, high: float) -> tuple[float, float, float]:
-    """First value, last value and step of a slider: round numbers within two limits.
-
-    Args:
-        low: Lower limit.
-        high: Upper limit, not below.
-
-    Returns:
-        Multiples of a step of 1, 2 or 5 times a power of ten, at least 400 of them between the limits; the limits themselves
-        where nothing is between them.
-    """
-    if high <= low:
-        return low, low, 1.0
-    step = round_down((high - low) / _STEPS)
-    digits = max(0, -math.floor(math.log10(step)))
-    first, last = math.ceil(low / step - 1e-9), math.floor(high / step + 1e-9)
-    return round(first * step, digits), round(last * step, digits), step
-
-
-def _ends(low: float, high: float, unit: str, relaxed: float) -> tuple[float, float]:
-    """Ends of a slider: the limits of the actuator; a missing one lies a default range from the other, or from zero.
-
-    The default range of a length is that around the length at rest.
-    """
-    around = 0.5 * relaxed if unit == "m" and relaxed > 0.0 else _AROUND[unit]
-    if math.isinf(low) and math.isinf(high):
-        return -around, around
-    if math.isinf(high):
-        return low, max(low, relaxed - around) + 2.0 * around
-    return high - 2.0 * around if math.isinf(low) else low, high
 
 
 def _facts(equilibrium: Equilibrium) -> list[tuple[str, str]]:

@@ -1,0 +1,125 @@
+"""A page without a server: sliders and dragging move a robot, and each equilibrium is solved and certified in the page."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import finite_array, positive_integer
+from softrobots.core.files import new_file, write_text
+from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.equilibrium import solve_equilibrium
+from softrobots.view.appearance import LINE_COLOUR, RIGID_COLOUR, TUBE_COLOUR
+from softrobots.view.interactive.robot_data import POINTS, robot_data
+from softrobots.view.interactive.text import interactive_text
+from softrobots.view.legend import LegendEntry
+from softrobots.view.meshcat_page.page_text import InlinePage
+from softrobots.view.scene import WRINKLING_COLOURS
+from softrobots.view.slider_ranges import visible_force
+
+
+def write_interactive(
+    model: SoftModel,
+    path: str | Path,
+    *,
+    title: str | None = None,
+    q_motors: Any = None,
+    force: Any = None,
+    gravity: Any = None,
+    overwrite: bool = False,
+) -> Path:
+    """Write a page that solves the statics of a robot by itself, in any browser: one HTML file that requests nothing.
+
+    Sliders move motors or muscles, the force on the tip and gravity; the tip can be dragged. The solver in the page is that of
+    `softrobots.compile`: each pose is in balance and certified stable. `window.softrobots.solve({motors, force, gravity})` in
+    the page returns tip, springs and status.
+
+    Args:
+        model: A robot that `softrobots.compile` takes.
+        path: The file.
+        title: Title of the page; the name of the robot by default.
+        q_motors: Actuator coordinates that are shown first, shape (n_motors,) [rad, m, N or Pa], or a mapping by name; relaxed
+            by default.
+        force: Force on the tip that is shown first, shape (3,) [N], world axes; none by default.
+        gravity: Gravity that is shown first, shape (3,) [m/s^2], world axes; None: weightless.
+        overwrite: Replace an existing file.
+
+    Returns:
+        The path.
+
+    Raises:
+        ParameterError: If an argument has the wrong shape, is not finite or out of range.
+        DescriptionError: If the robot is not a serial chain with linear springs.
+        EquilibriumNotFound: If there is no equilibrium at the start.
+        OutputExists: If the file exists and `overwrite` is false.
+        ViewerError: If a shape cannot be drawn.
+    """
+    new_file(path, overwrite=overwrite)  # refused before the work
+    return write_text(path, _page(model, title, q_motors, force, gravity), overwrite=overwrite)
+
+
+def interactive(
+    model: SoftModel,
+    *,
+    title: str | None = None,
+    q_motors: Any = None,
+    force: Any = None,
+    gravity: Any = None,
+    height: int = 560,
+) -> InlinePage:
+    """Return the page of `write_interactive` for a cell of a notebook, which needs no server and no extension.
+
+    Args:
+        model: A robot that `softrobots.compile` takes.
+        title: As in `write_interactive`.
+        q_motors: As there.
+        force: As there.
+        gravity: As there.
+        height: Height in the notebook [px].
+
+    Raises:
+        ParameterError: If an argument has the wrong shape, is not finite or out of range.
+        DescriptionError: If the robot is not a serial chain with linear springs.
+        EquilibriumNotFound: If there is no equilibrium at the start.
+        ViewerError: If a shape cannot be drawn.
+    """
+    return InlinePage(_page(model, title, q_motors, force, gravity), positive_integer("height", height, 10_000))
+
+
+def _page(model: SoftModel, title: str | None, q_motors: Any, force: Any, gravity: Any) -> str:
+    """The text of the page."""
+    from softrobots.compiled.run.compiled_model import compile_model
+
+    motors = check_model(model).checked_motors(model.relaxed_motors if q_motors is None else q_motors)
+    push = finite_array("force", (0.0, 0.0, 0.0) if force is None else force, (3,), "N")
+    weight = None if gravity is None else finite_array("gravity", gravity, (3,), "m/s^2").tolist()
+    solver = compile_model(model, backend="python").js_source(points=POINTS)
+    solve_equilibrium(model, motors, push, gravity=weight)  # refused here rather than on the page
+    largest = max(visible_force(model), float(np.abs(push).max()))
+    data = robot_data(solve_equilibrium(model, model.relaxed_motors), largest)
+    data["start"] = {"motors": motors.tolist(), "force": push.tolist(), "gravity": weight}
+    kinds = _kinds(model)
+    return interactive_text(data, solver, title or str(model.pinocchio.name), kinds, _legend(model, data))
+
+
+def _kinds(model: SoftModel) -> str:
+    """What moves a robot, in a word."""
+    if model.n_motors > len(model.muscles) or not model.muscles:
+        return "motors"
+    return "tendons" if all(tag.name.startswith("tendon") for tag in model.muscles) else "muscles"
+
+
+def _legend(model: SoftModel, data: dict[str, Any]) -> list[LegendEntry]:
+    """Colour and meaning of what is drawn."""
+    entries = [LegendEntry(RIGID_COLOUR, "the robot at rest")] * any(solid["elastic"] for solid in data["solids"])
+    entries += [LegendEntry(TUBE_COLOUR, "body")] * any(tube["link"] is None for tube in data["tubes"])
+    lines = [curve["name"] for curve in data["curves"] if curve["name"] not in {one["name"] for one in data["actuators"]}]
+    entries += [LegendEntry(LINE_COLOUR, name) for name in (*lines, *["actuators"] * (len(lines) < len(data["curves"])))]
+    above = 1.0
+    for least, colour in WRINKLING_COLOURS if model.spring_groups else ():
+        words = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if np.isfinite(least) else "wrinkled"
+        entries.append(LegendEntry(colour, words))
+        above = least
+    return entries

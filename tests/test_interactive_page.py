@@ -1,0 +1,322 @@
+"""The page that solves by itself, in a real Chromium, from a file, without a network: its answers, drawing and controls."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import softrobots as sr
+from softrobots.view.body import body
+from softrobots.view.robot_shapes import RobotShapes
+from softrobots.view.slider_ranges import visible_force
+
+ROBOTS: dict[str, Callable[[], Any]] = {
+    "arm": sr.InflatableArm,
+    "pcc": sr.PccArm,
+    "tendon": sr.TendonArm,
+    "helix": sr.HelixTube,
+}
+STARTS = {"arm": {"q_motors": (0.3, 0.6, -0.8), "force": (0, 10, -15)}, "helix": {"gravity": sr.EARTH_GRAVITY}}
+SIZES = {"wide": (1280, 800), "phone": (390, 844), "frame": (400, 460)}
+
+
+class Tab:
+    """A page in the browser, and what it complains about or requests."""
+
+    def __init__(self, browser: Any, file: Path, size: str = "wide", state: str = "") -> None:
+        width, height = SIZES[size]
+        self.context = browser.new_context(viewport={"width": width, "height": height}, has_touch=True)
+        self.page = self.context.new_page()
+        self.errors: list[str] = []
+        self.requests: list[str] = []
+        self.page.on("pageerror", lambda error: self.errors.append(str(error)))
+        self.page.on("console", lambda line: self.errors.append(line.text) if line.type == "error" else None)
+        self.page.on("request", lambda request: self.requests.append(request.url))
+        self.context.set_offline(True)
+        self.page.goto(file.as_uri() + state)
+        self.page.evaluate("softrobots.ready.then(() => true)")
+
+    def run(self, script: str, value: Any = None) -> Any:
+        """Run a function in the page."""
+        return self.page.evaluate(script, value)
+
+    def shown(self, wanted: Callable[[dict[str, Any]], bool] = lambda _: True) -> dict[str, Any]:
+        """What is shown, once it is as wanted."""
+        for _ in range(200):
+            shown = self.run("softrobots.shown")
+            if wanted(shown):
+                return shown
+            self.page.wait_for_timeout(25)
+        raise AssertionError(f"the page still shows {shown}")
+
+
+@pytest.fixture(scope="module")
+def models() -> dict[str, sr.SoftModel]:
+    return {name: sr.load_model(robot()) for name, robot in ROBOTS.items()}
+
+
+@pytest.fixture(scope="module")
+def files(models: dict[str, sr.SoftModel], tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    folder = tmp_path_factory.mktemp("pages")
+    return {
+        name: sr.write_interactive(model, folder / f"{name}.html", **STARTS.get(name, {})) for name, model in models.items()
+    }
+
+
+@pytest.fixture
+def open_tab(browser: Any, files: dict[str, Path]) -> Iterator[Callable[..., Tab]]:
+    tabs: list[Tab] = []
+
+    def opened(name: str, size: str = "wide", state: str = "") -> Tab:
+        tabs.append(Tab(browser, files[name], size, state))
+        return tabs[-1]
+
+    yield opened
+    for tab in tabs:
+        tab.context.close()
+        assert tab.errors == []
+        assert [url for url in tab.requests if not url.startswith("file:")] == []
+        assert len(tab.requests) == 1
+
+
+def loaded(model: sr.SoftModel, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Actuators within a third of their limits, and a force that bends the robot visibly."""
+    motors = model.relaxed_motors
+    if model.n_motors:
+        motors = motors + 0.3 * (np.array(model.actuators.draw(rng)) - motors)
+    return motors, 0.3 * visible_force(model) * rng.normal(size=3)
+
+
+@pytest.mark.parametrize("name", ROBOTS)
+def test_the_page_solves_and_draws_what_python_solves(
+    name: str, open_tab: Callable[..., Tab], models: dict[str, sr.SoftModel], rng: np.random.Generator
+) -> None:
+    """Newton's method on Pinocchio and the generated code in the browser; both leave at most 1e-10 of the load."""
+    model, tab = models[name], open_tab(name)
+    shapes = RobotShapes(model)
+    for gravity in (None, sr.EARTH_GRAVITY, (3.0, 0.0, -5.0)):
+        motors, force = loaded(model, rng)
+        expected = sr.solve_equilibrium(model, motors, force, gravity=gravity)
+        given = {"motors": motors.tolist(), "force": force.tolist(), "gravity": gravity}
+        found = tab.run("given => { const a = softrobots.solve(given); return {...a, springs: [...a.springs]}; }", given)
+        assert (found["status"], found["statusText"]) == (0, "certified stable")
+        np.testing.assert_allclose(found["tip"], expected.tip_position, rtol=0, atol=1e-9)
+        np.testing.assert_allclose(found["springs"], expected.q_springs, rtol=0, atol=1e-9)
+        drawn = tab.run(
+            """given => {
+            softrobots.set(given);
+            const {view} = softrobots, words = document.getElementById("links").innerText;
+            return {tip: softrobots.shown.drawnTip, words, poses: view.solids.map(({mesh}) => mesh.matrix.elements),
+              rings: view.tubes.map(({drawn: {geometry, rings, sides}}) => {
+                const at = geometry.attributes.position.array, points = [];
+                for (let ring = 0; ring < rings; ring++) {
+                  const sum = [0, 0, 0];
+                  for (let k = 0; k < sides; k++) for (let a = 0; a < 3; a++) sum[a] += at[3 * (ring * sides + k) + a] / sides;
+                  points.push(sum);
+                }
+                return points;
+              })};
+            }""",
+            given,
+        )
+        np.testing.assert_allclose(drawn["tip"], expected.tip_position, rtol=0, atol=1e-9)
+        poses = [np.reshape(pose, (4, 4)).T for pose in drawn["poses"]]
+        everything = np.array(shapes.transforms(model.embed(model.coordinates.at(motors, expected.q_springs).joints)))
+        for pose in poses:  # the page leaves out pieces of the chain in sections; 1e-7 m is what is rounded in the file
+            assert np.abs(everything - pose).max(axis=(1, 2)).min() < 3e-7
+        if model.structure.constant_strain:
+            points = np.concatenate([segment.backbone for segment in body(expected)])
+            for ring in np.concatenate(drawn["rings"]):  # corners are numbers of 32 bits
+                assert np.linalg.norm(points - ring, axis=1).min() < 3e-7
+        margins = expected.link_limits.wrinkling_margins
+        if len(margins):
+            shown = [int(number) for number in re.findall(r"(-?\d+) % left", drawn["words"])]
+            wanted = margins if len(margins) <= 4 else [margins.min()]
+            np.testing.assert_allclose(shown, 100 * np.array(wanted), atol=0.51)
+
+
+def test_sliders_numbers_and_gravity_change_what_is_shown(
+    open_tab: Callable[..., Tab], models: dict[str, sr.SoftModel]
+) -> None:
+    tab = open_tab("arm")
+    page = tab.page
+    page.get_by_role("slider", name="motor_2").focus()
+    for _ in range(10):
+        page.keyboard.press("ArrowRight")
+    raised = tab.shown(lambda shown: shown["motors"][1] > 0.69)
+    assert raised["motors"][0] == 0.3
+    page.get_by_role("spinbutton", name="force z").fill("-3.25")
+    pulled = tab.shown(lambda shown: shown["force"] == [0, 10, -3.25])
+    page.get_by_label("gravity").select_option(label="down, 9.81 m/s²")
+    heavy = tab.shown(lambda shown: shown["gravity"] is not None)
+    for state in (raised, pulled, heavy):
+        expected = sr.solve_equilibrium(models["arm"], state["motors"], state["force"], gravity=state["gravity"])
+        np.testing.assert_allclose(state["drawnTip"], expected.tip_position, rtol=0, atol=1e-9)
+    page.get_by_role("button", name="Reset").click()
+    tab.shown(lambda shown: shown["force"] == [0, 10, -15] and shown["gravity"] is None and shown["motors"] == [0.3, 0.6, -0.8])
+
+
+@pytest.mark.parametrize("name", ["arm", "pcc", "helix"])
+def test_dragging_the_tip_pulls_it(name: str, open_tab: Callable[..., Tab]) -> None:
+    tab = open_tab(name)
+    before = tab.shown()
+    drag(tab, 60, -40)
+    after = tab.shown(lambda shown: shown["force"] != before["force"])
+    assert after["motors"] == before["motors"]
+    pull, moved = np.subtract(after["force"], before["force"]), np.subtract(after["tip"], before["tip"])
+    assert pull @ moved > 0  # of a stable robot under a dead force
+    right, up, _ = (np.array(list(axis.values())) for axis in tab.run("softrobots.view.axes().map(({x, y, z}) => ({x, y, z}))"))
+    assert pull @ right > 0
+    assert pull @ up > 0
+
+
+@pytest.mark.parametrize("name", ["arm", "pcc"])
+def test_dragging_the_tip_moves_the_motors(name: str, open_tab: Callable[..., Tab], models: dict[str, sr.SoftModel]) -> None:
+    tab = open_tab(name)
+    before = tab.shown()
+    tab.page.get_by_label("moves the").check()
+    target = drag(tab, -50, -30)
+    after = tab.shown(lambda shown: shown["motors"] != before["motors"])
+    assert after["force"] == before["force"]
+    x, y = tab.run("softrobots.view.onScreen(softrobots.view.tip)")
+    assert np.hypot(x - target[0], y - target[1]) < 12  # pixels; it was 58 away
+    low, high = models[name].motor_limits.T
+    assert np.all((np.array(after["motors"]) >= low) & (np.array(after["motors"]) <= high))
+
+
+def drag(tab: Tab, right: float, down: float) -> tuple[float, float]:
+    """Drag the tip by pixels; where the pointer is then, if it took the tip in its middle."""
+    box = tab.page.locator("#tip").bounding_box()
+    x, y = box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+    tab.page.mouse.move(x, y)
+    tab.page.mouse.down()
+    tab.page.mouse.move(x + right, y + down, steps=6)
+    tab.page.wait_for_timeout(600)
+    tab.page.mouse.up()
+    return x + right, y + down
+
+
+def test_keys_pull_the_tip_and_turn_the_picture(open_tab: Callable[..., Tab]) -> None:
+    tab = open_tab("helix")
+    page = tab.page
+    page.locator("#tip").focus()
+    page.keyboard.press("ArrowUp")
+    assert tab.shown(lambda shown: any(shown["force"]))["force"][2] > 0
+    page.locator("#canvas").focus()
+    before = tab.run("softrobots.view.view.turn")
+    page.keyboard.press("ArrowLeft")
+    assert tab.run("softrobots.view.view.turn") != before
+
+
+def test_bad_input_is_refused_and_says_what_is_required(open_tab: Callable[..., Tab]) -> None:
+    tab = open_tab("arm")
+    before = tab.shown()
+    for given, words in (
+        ("{motors: [0, 1]}", r"\[0, 1\].*3 finite numbers"),
+        ("{motors: [0, 1, NaN]}", r"NaN.*3 finite numbers"),
+        ("{motors: {motor_9: 1}}", "motor_9.*motor_1"),
+        ("{force: 3}", "3.*3 finite numbers"),
+        ("{force: [0, 0, '1']}", "3 finite numbers"),
+        ("{gravity: [0, 0, Infinity]}", "Infinity.*3 finite numbers"),
+        ("{mass: 1}", "mass.*motors, force, gravity"),
+        ("7", "7.*an object"),
+    ):
+        for call in ("solve", "set"):
+            script = (
+                f"() => {{ try {{ softrobots.{call}({given}); return null; }} catch (e) {{ return [e.name, e.message]; }} }}"
+            )
+            name, message = tab.run(script)
+            assert name == "TypeError"
+            assert re.search(words, message), message
+    assert tab.shown() == before
+    assert tab.run("softrobots.set({motors: {motor_2: 0.1}}).status") == 0
+    assert tab.shown()["motors"] == [0.3, 0.1, -0.8]  # the others stay
+
+
+def test_a_pose_stays_where_there_is_no_equilibrium_and_the_page_says_why(open_tab: Callable[..., Tab]) -> None:
+    tab = open_tab("pcc")
+    before = tab.shown()
+    found = tab.run("softrobots.set({force: [1e5, 0, 0]})")
+    assert found["status"] not in (0, 8)
+    after = tab.shown()
+    assert after["tip"] == before["tip"]
+    assert after["failed"] == found["statusText"]
+    assert found["statusText"] in tab.page.inner_text("#status")
+    assert "last certified pose" in tab.page.inner_text("#status")
+    tab.run("softrobots.set({force: [0, 0, 0]})")
+    assert tab.shown()["failed"] == ""
+
+
+@pytest.mark.parametrize("size", ["phone", "frame"])
+def test_a_narrow_window_shows_robot_and_controls(size: str, open_tab: Callable[..., Tab]) -> None:
+    tab = open_tab("arm", size)
+    width, height = SIZES[size]
+    assert tab.run("document.documentElement.scrollWidth") <= width
+    toggle = tab.page.locator("#toggle")
+    if size == "frame":
+        assert not tab.page.locator("#panel").is_visible()
+        toggle.tap()
+    slider = tab.page.get_by_role("slider", name="motor_1")
+    slider.scroll_into_view_if_needed()
+    box = slider.bounding_box()
+    assert box["x"] >= 0
+    assert box["x"] + box["width"] <= width
+    assert box["y"] + box["height"] <= height
+    points = tab.run(
+        """() => { const {view} = softrobots; return view.solids.map(({mesh}) => {
+          const at = view.tip.clone().setFromMatrixPosition(mesh.matrix); return view.onScreen(at); }); }"""
+    )
+    across, down = np.array(points).T
+    assert across.min() > 0
+    assert across.max() < width
+    assert down.min() > 0
+    assert down.max() < tab.page.locator("#canvas").bounding_box()["height"]
+    toggle.tap()
+    assert not tab.page.locator("#panel").is_visible()
+
+
+def test_the_address_holds_the_state(open_tab: Callable[..., Tab]) -> None:
+    tab = open_tab("arm")
+    tab.run("softrobots.set({motors: [0.1, 0.2, 0.3], force: [1, 2, -3], gravity: [0, 0, -1.62]})")
+    state = "#" + tab.page.url.partition("#")[2]
+    again = open_tab("arm", "wide", state).shown()
+    assert {name: again[name] for name in ("motors", "force", "gravity")} == {
+        "motors": [0.1, 0.2, 0.3],
+        "force": [1, 2, -3],
+        "gravity": [0, 0, -1.62],
+    }
+
+
+def test_the_page_works_in_the_frame_of_a_notebook(browser: Any, models: dict[str, sr.SoftModel]) -> None:
+    inline = sr.interactive(models["arm"], q_motors={"motor_1": 0.0, "motor_2": 0.5, "motor_3": -0.5})
+    tab = browser.new_page(viewport={"width": 800, "height": 640})
+    tab.set_content(f"<body>{inline._repr_html_()}</body>")
+    frame = tab.frames[1]
+    frame.wait_for_function("window.softrobots?.shown?.tip")
+    assert frame.evaluate("softrobots.shown.motors") == [0.0, 0.5, -0.5]
+    tab.close()
+
+
+def test_pages_are_small_and_the_same_again(arm: sr.SoftModel, tmp_path: Path) -> None:
+    file = sr.write_interactive(arm, tmp_path / "arm.html", title="<Arm> & co")
+    text = file.read_text(encoding="utf-8")
+    assert len(text) < 1_000_000
+    assert "<title>&lt;Arm&gt; &amp; co</title>" in text
+    assert sr.interactive(arm, title="<Arm> & co").page == text
+    assert not re.search(r"(?:src|href)=\"https?:", text)
+    with pytest.raises(sr.OutputExists, match="exists"):
+        sr.write_interactive(arm, file)
+    with pytest.raises(sr.ParameterError, match="force"):
+        sr.write_interactive(arm, tmp_path / "no.html", force=(0, 0, np.nan))
+    with pytest.raises(sr.DescriptionError, match="compiled solvers"):
+        sr.interactive(sr.load_model(sr.InflatableArm(moment_law="plateau", max_moment=20.0)))
+    assert not (tmp_path / "no.html").exists()
+
+
+def test_pages_of_long_robots_are_small(files: dict[str, Path]) -> None:
+    assert max(file.stat().st_size for file in files.values()) < 2_500_000
