@@ -38,6 +38,7 @@ WITHOUT = {
     "dynamics.motion.MotionEnergy": _RESULT,
     "MotionState": _RESULT,
     **dict.fromkeys((f"statics.contact.contact_path.Contact{name}" for name in ("Event", "Jump")), _RESULT),
+    "statics.contact.clearance.Clearance": _RESULT,
     **dict.fromkeys((f"statics.contact.grasp.{name}" for name in ("ForceClosure", "PullOut")), _RESULT),
     "view.live.commands.Wanted": _RESULT,
     "view.meshcat_page.page_text.InlinePage": "a page of somebody else's notebook: test_view_command shows it in a browser",

@@ -77,6 +77,7 @@ PAGES = {
             *_top("follow_contact", "ContactPath"),
             *(f"softrobots.statics.contact.contact_path.{name}" for name in ("ContactEvent", "ContactJump")),
             *_top("contact_sensitivity", "locate_contact", "contact_wrench", "is_force_closure", "pull_out_force"),
+            "softrobots.statics.contact.clearance.Clearance",
             "softrobots.statics.contact.contact_sensitivity.ContactSensitivity",
             "softrobots.statics.tip_force.contact_place.ContactPlace",
             *(f"softrobots.statics.contact.grasp.{name}" for name in ("ForceClosure", "PullOut")),

@@ -16,6 +16,7 @@ from softrobots.model.actuators import slack_tendons
 from softrobots.model.link_limits import LinkLimits, link_limits, link_moments
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.contact.certificate import null_space
+from softrobots.statics.contact.clearance import Clearance, clearance
 from softrobots.statics.contact.contact import Contact, with_contacts
 from softrobots.statics.contact.touch import TOUCHING
 from softrobots.statics.equilibrium_summary import equilibrium_parts
@@ -141,6 +142,15 @@ class Equilibrium(Summarised):
             NameNotFound: If there is no such frame.
         """
         return frame_jacobian(self.model, self.q, self.model.tip if frame is None else frame)
+
+    def clearance(self, environment: Any) -> Clearance:
+        """Smallest gap between the robot in this pose and obstacles, of which the equilibrium need not know; and where it is.
+
+        Raises:
+            ParameterError: If `environment` is none, an obstacle moves, or there is nothing that the robot could touch.
+            DescriptionError: If the robot has no shapes that can touch.
+        """
+        return clearance(self.model, self.q, environment)
 
     @cached_property
     def link_moments(self) -> FloatArray:
