@@ -315,7 +315,7 @@ def nav_pages() -> list[str]:
 
 def test_the_navigation_shows_every_page(site: Callable[[str], ModuleType]) -> None:
     api = {f"api/{name}.md" for name in (*site("api_pages").PAGES, "index")}
-    there = {path.name for path in (*DOCS.glob("*.md"), *DOCS.glob("*.ipynb"))}
+    there = {path.relative_to(DOCS).as_posix() for kind in ("*.md", "*.ipynb", "notebooks/*.ipynb") for path in DOCS.glob(kind)}
     listed = nav_pages()
     assert len(listed) == len(set(listed))
     assert set(listed) == there | api | {"changelog.md", "contributing.md"}
