@@ -54,7 +54,8 @@ def coal_bounds(file: Path) -> np.ndarray:
     return np.array([np.ravel(box.aabb_local.min_), np.ravel(box.aabb_local.max_)])
 
 
-@pytest.mark.parametrize("suffix", [".xml", pytest.param(".urdf", marks=pytest.mark.study)])
+@pytest.mark.study
+@pytest.mark.parametrize("suffix", [".xml", ".urdf"])
 def test_mujoco_opens_all_meshes_from_another_folder(tmp_path: Path, tool: Tool, suffix: str) -> None:
     mujoco = tool("mujoco")
     model = carried()
