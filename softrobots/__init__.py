@@ -31,6 +31,7 @@ from softrobots.core.errors import (
     ViewerError,
 )
 from softrobots.core.result_file import load_result, save_csv, save_result
+from softrobots.core.suspicion import SuspiciousInputWarning
 from softrobots.description.composition import mount
 from softrobots.dynamics.controllers import PD, ClosedLoop
 from softrobots.dynamics.damping import damping_time_from_decrement, measured_decay
@@ -137,6 +138,7 @@ __all__ = [
     "SpringGroup",
     "Stability",
     "StraightTube",
+    "SuspiciousInputWarning",
     "TargetUnreachable",
     "TendonArm",
     "Trajectory",

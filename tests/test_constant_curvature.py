@@ -510,6 +510,7 @@ def test_arcs_are_frozen() -> None:
     assert pickle.loads(pickle.dumps(arc)).length.tolist() == [0.5, 0.6]
 
 
+@pytest.mark.filterwarnings("ignore::softrobots.SuspiciousInputWarning")  # sizes of any kind are meant
 @law("constant_curvature.arc_from_muscles", "constant_curvature.arc_jacobian", "constant_curvature.muscle_jacobian")
 @settings(max_examples=200)
 @given(st.lists(st.floats(1e-30, 1e30), min_size=3, max_size=3), st.floats(1e-30, 1e30), st.sampled_from(FRAMES))

@@ -382,7 +382,7 @@ def test_pages_cover_the_tube_and_meet_at_the_joins(page: float, overlap: float,
 def test_a_page_shows_the_same_marks_as_the_whole_sheet(tmp_path: Path):
     plan = pinch_pattern(REFERENCE, 0.02, handedness="left")
     whole = read(write_template(plan, tmp_path / "whole.svg"))
-    page = read(write_template_pages(plan, tmp_path / "tube.svg")[2])
+    page = read(write_template_pages(plan, tmp_path / "tube")[2])  # pages are SVG, whatever the name
     shared = found(page, "pinch")
     assert len(shared) > 10
     for group in shared:
@@ -710,7 +710,7 @@ def test_rounding_at_the_seam_starts_the_next_wrap():
 def test_what_is_no_pattern_is_refused_by_name():
     error = refused(lambda: helix.discrete_centre_line(REFERENCE))
     assert (error.field, error.value) == ("pattern", REFERENCE)
-    assert "pattern must be a Pattern (returned by helix.pinch_pattern)" in str(error)
+    assert "pattern must be a Pattern; helix.pinch_pattern(design, spacing) makes one of a HelixDesign" in str(error)
 
 
 @each_row(

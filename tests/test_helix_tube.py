@@ -586,6 +586,7 @@ BAD_PARAMETERS: list[tuple[dict[str, object], str]] = [
 ]
 
 
+@pytest.mark.filterwarnings("ignore::softrobots.SuspiciousInputWarning")  # one of 400 m is asked about, too
 @each_row(("parameters", "field"), BAD_PARAMETERS)
 def test_bad_parameters_of_the_tube_are_refused(parameters: dict, field: str) -> None:
     with pytest.raises(sr.ParameterError, match=field) as caught:

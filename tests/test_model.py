@@ -370,3 +370,29 @@ def test_rotors_and_friction_pass_through_other_formats(write: str, module: str,
         assert sorted(spec.dof_armature.tolist()) == [0.0] * 4 + [0.05] * 3
     else:
         assert "<friction>0.5</friction>" in text
+
+
+def test_a_robot_is_loaded_and_mounted_by_its_name(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The name wins over a file of that name, which a path means; an unknown one is told with names and files."""
+    robot = sr.ROBOTS["inflatable_arm_two_hinges"]()
+    model = sr.load_model("inflatable_arm_two_hinges")
+    assert model == sr.load_model(robot)
+    assert model.robot == robot
+    assert sr.mount("inflatable_arm", "tip", "pcc_arm") == sr.mount(sr.InflatableArm(), "tip", sr.PccArm())
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "pcc_arm").write_text(robot.urdf(), encoding="utf-8")
+    (tmp_path / "other.urdf").write_text(robot.urdf(), encoding="utf-8")
+    assert sr.load_model("pcc_arm") == sr.load_model(sr.PccArm())
+    assert sr.load_model(Path("pcc_arm")) == sr.load_model("./pcc_arm") == model
+    with pytest.raises(
+        sr.DescriptionError, match=r"name of a robot is required: helix_tube, inflatable_arm, .*; files in \.: other"
+    ):
+        sr.load_model("helix_tub")
+
+
+def test_springs_for_some_joints_leave_the_others_as_they_are() -> None:
+    """No spring becomes a motor unless None says so, and the roles tell what became of every joint."""
+    model = sr.load_model(sr.InflatableArm().urdf(), springs={"spring_1_side": 100.0, "spring_1_up": 120.0})
+    assert model.actuator_names == ("motor_1", "motor_2", "motor_3")
+    assert model.stiffness.tolist() == [100.0, 120.0, 172.71, 172.71]
+    assert [model.joint_roles[f"spring_{place}"] for place in ("1_up", "2_up")] == ["given spring", "spring"]

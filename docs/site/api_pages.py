@@ -169,7 +169,7 @@ PAGES = {
     "errors": ApiPage(
         "Errors",
         "Everything that is raised on purpose. `except softrobots.SoftRobotsError` catches it all.",
-        _top("core.errors"),
+        _top("core.errors", "SuspiciousInputWarning"),
     ),
     "command_line": ApiPage(
         "Command line",

@@ -17,6 +17,7 @@ from softrobots.constant_curvature.poses import FRAMES
 from softrobots.core.checks import FloatArray, positive_array
 from softrobots.core.errors import ParameterError
 from softrobots.core.summary import aligned
+from softrobots.core.suspicion import stretched_too_far
 from softrobots.model.loader import load_model
 from softrobots.robots import PccArm
 from softrobots.statics.inverse_kinematics import solve_ik
@@ -115,6 +116,11 @@ def _forward(arguments: argparse.Namespace) -> None:
         raise ParameterError("L", arguments.lengths, f"a multiple of {count} numbers, {count} muscles per segment [m]")
     lengths = lengths.reshape(-1, count)
     distance = _per_segment("--distance", arguments.distance, len(lengths))
+    rest = np.repeat(_per_segment("--rest", arguments.rest or [REST], len(lengths)), count)
+    names = [f"L{place}" for place in range(1, lengths.size + 1)]
+    requirement = stretched_too_far(names, lengths.ravel().tolist(), rest.tolist())
+    if requirement is not None:
+        raise ParameterError("L", arguments.lengths, requirement)
     arcs = constant_curvature.arc_from_muscles(lengths, distance, arguments.azimuths, arguments.tolerance)
     _answer(arguments, lengths, arcs, distance)
 

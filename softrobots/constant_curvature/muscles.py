@@ -19,10 +19,13 @@ import numpy as np
 from softrobots.constant_curvature.arcs import Arc, arc_from_strains, checked_arc
 from softrobots.core.checks import FloatArray, common_shape, finite_array, non_negative_number, positive_array
 from softrobots.core.errors import ParameterError
+from softrobots.core.suspicion import question
 
 AZIMUTHS = (0.0, -2.0 * math.pi / 3.0, 2.0 * math.pi / 3.0)
 """Azimuths of the three muscles of [PCC paper], figure 9 [rad]."""
 
+_FOUR_TURNS = 8.0 * math.pi
+_SLENDER = 500.0  # times the distance of its muscles, from which on a segment is hardly in the same unit
 SAME_AZIMUTH = 1e-9  # [rad]
 LARGEST_CONDITION = 1e6  # condition number of the map from arc to muscle lengths; beyond, more than six digits are lost
 
@@ -97,6 +100,9 @@ def arc_from_muscles(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS, tole
     Its (41) takes the root of `l1^2 + l2^2 + l3^2 - l1 l2 - l1 l3 - l2 l3`, the same number, but that sum of large terms
     cancels near the straight configuration and loses half the digits or all; the differences above lose none.
 
+    More than four turns of a segment longer than 500 distances, as lengths in centimetres and a distance in m give, issue a
+    `SuspiciousInputWarning`.
+
     Args:
         lengths: Muscle lengths [m], positive, shape (..., N).
         distance: Distance `d` of the muscles from the backbone [m], positive, any shape that broadcasts with (...).
@@ -109,7 +115,12 @@ def arc_from_muscles(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS, tole
     Raises:
         ParameterError: As `strains_from_muscles`.
     """
-    return arc_from_strains(strains_from_muscles(lengths, distance, azimuths, tolerance))
+    arc = arc_from_strains(strains_from_muscles(lengths, distance, azimuths, tolerance))
+    most = float(arc.bending.max(initial=0.0))
+    if most > _FOUR_TURNS and np.any(arc.length > _SLENDER * np.asarray(distance)):
+        turns = most / (2.0 * math.pi)
+        question(f"lengths bend a segment by {most:.4g} rad, {turns:.3g} turns: are lengths and distance in m?")
+    return arc
 
 
 def muscle_residual(lengths: Any, distance: Any, azimuths: Any = AZIMUTHS) -> FloatArray:

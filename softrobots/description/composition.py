@@ -51,7 +51,8 @@ def mount(
     `<mujoco>` the carrier's is kept. Relative paths of meshes are made absolute.
 
     Args:
-        parent_urdf: The carrier: a robot of this package, the path of a URDF file, or URDF text (what `load_model` takes).
+        parent_urdf: The carrier: a robot of this package or its name, the path of a URDF file, or URDF text (what `load_model`
+            takes).
         link: Link of the carrier.
         robot: The robot to be mounted, likewise.
         prefix: Prefix of every name of the mounted robot; letters, digits and underscores.

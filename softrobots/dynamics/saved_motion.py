@@ -45,7 +45,7 @@ def _unpack(fields: Mapping[str, Any]) -> Motion:
     names = [one.name for one in fields_of(MotionEnergy)]
     energies = {name: read_only(finite_array(name, fields[name], (len(time),), "J")) for name in names}
     for motors in columns["q_motors"]:
-        model.checked_motors(motors)
+        model.actuators.checked(motors)
     for motors, springs in zip(columns["q_motors"], columns["q_springs"], strict=True):
         if not model.coordinates.at(motors, springs).valid:
             raise FileFormatError("a section is out of its range")

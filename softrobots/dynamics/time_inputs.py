@@ -44,7 +44,8 @@ class MotorPath:
         elif callable(q_motors):
             self._signal = motor_function("q_motors", q_motors, model)
             for time in np.linspace(0.0, duration, 21).tolist():
-                model.checked_motors(self._signal(time), f"q_motors(t={time:.6g})")
+                model.actuators.checked(self._signal(time), f"q_motors(t={time:.6g})")
+            model.actuators.questioned(self._signal(0.0))
             self._find_kicks(model, duration)
         else:
             values = model.checked_motors(q_motors)

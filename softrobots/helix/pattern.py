@@ -160,7 +160,7 @@ class Pattern(Summarised):
 def checked_pattern(pattern: Any) -> Pattern:
     """Return `pattern` if it is a `Pattern`, or raise ParameterError."""
     if not isinstance(pattern, Pattern):
-        raise ParameterError("pattern", pattern, "a Pattern (returned by helix.pinch_pattern)")
+        raise ParameterError("pattern", pattern, "a Pattern; helix.pinch_pattern(design, spacing) makes one of a HelixDesign")
     return pattern
 
 

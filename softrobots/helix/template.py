@@ -67,7 +67,7 @@ def write_template_pages(
 
     Args:
         pattern: The plan.
-        path: Name of the files, to which the page number is added: `tube.svg` gives `tube-1.svg`, `tube-2.svg`, ...
+        path: Name of the files, to which the page number is added: `tube` and `tube.svg` give `tube-1.svg`, `tube-2.svg`, ...
         page_length: Length of the tube on a page; 0.25 m fits A4 in landscape format [m].
         overlap: Part of it that the next page repeats, at most half [m].
         overwrite: Replace existing files.
@@ -96,7 +96,8 @@ def write_template_pages(
     count = max(1, math.ceil((length - common) / step - _ROUNDING))
     digits = len(str(count))
     targets = [
-        new_file(base.with_name(f"{base.stem}-{n + 1:0{digits}}{base.suffix}"), overwrite=overwrite) for n in range(count)
+        new_file(base.with_name(f"{base.stem}-{n + 1:0{digits}}{base.suffix or '.svg'}"), overwrite=overwrite)
+        for n in range(count)
     ]
     joins = [step * n + 0.5 * common for n in range(1, count)]  # in the middle of the overlap of two pages
     for n, target in enumerate(targets):

@@ -66,6 +66,6 @@ def check_coordinates(model: SoftModel, motors: FloatArray, where: Callable[[int
     """
     for row, one in enumerate(motors):
         try:
-            model.checked_motors(one, f"q_motors ({where(row)})")
+            model.actuators.checked(one, f"q_motors ({where(row)})")
         except ParameterError as error:
             raise ParameterError(error.field, error.value, f"{error.requirement}; are unit and sign right?") from error

@@ -94,7 +94,7 @@ class GeneralResponses:
         springs, tips, errors, statuses = self._room(count)
         for row, (at, push) in enumerate(_rows(count, motors, force)):
             try:
-                checked = model.checked_motors(at)
+                checked = model.actuators.checked(at)
             except ParameterError:
                 statuses[row] = Status.NOT_A_NUMBER
                 continue

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.suspicion import MOST_STRETCH, stretched_too_far
 from softrobots.description.urdf_tags import ActuatorTag
 
 UNITS = {"length": "m", "tension": "N", "elastic": "m", "pressure": "Pa", "mckibben": "Pa"}
@@ -59,6 +60,7 @@ class ActuatorLaws:
         """Kind of each."""
         self.given = np.array([tag.kind == "tension" for tag in tags], dtype=bool)
         """Of which the input is the tension itself, shape (n_muscles,)."""
+        self._names = [tag.name for tag in tags]
         self._rest = np.array([tag.rest_length for tag in tags])
         self._of = {kind: np.flatnonzero([one == kind for one in self.kinds]) for kind in dict.fromkeys(self.kinds)}
         self._stiffness, self._pretension, self._area = (
@@ -88,8 +90,12 @@ class ActuatorLaws:
 
     def refusal(self, inputs: FloatArray) -> str | None:
         """Return the requirement that inputs fail; None if there is none."""
-        if np.any(inputs[self._of.get("elastic", [])] <= 0.0):
+        places = self._of.get("elastic", np.zeros(0, dtype=np.intp))
+        if np.any(inputs[places] <= 0.0):
             return "positive lengths of the motors of elastic actuators [m]"
+        if np.any(inputs[places] > MOST_STRETCH * self._rest[places]):
+            names = [self._names[place] for place in places]
+            return stretched_too_far(names, inputs[places].tolist(), self._rest[places].tolist())
         if np.any(inputs[self._of.get("mckibben", [])] < 0.0):
             return "pressures of McKibben muscles >= 0 [Pa]"
         return None

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Sequence
 from functools import cached_property
+from operator import gt
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import NameNotFound, ParameterError
+from softrobots.core.suspicion import question_angle, question_length
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.actuator_laws import (
     UNFELT,
@@ -25,6 +28,9 @@ from softrobots.model.actuator_laws import (
 from softrobots.model.muscle_lengths import MuscleLengths
 
 _TAUT = 1e-7  # tension of a tendon that is just taut, relative to what is worth a radian
+_BEYOND = 2.5  # times the limit of an angle, from which on it is hardly in rad
+_MOST_DEGREES = 3.6e4  # a hundred turns, beyond which a number is something else
+_FAR = 30.0  # times the limit of a slide, from which on it is hardly in m
 _LOAD_UNITS = {"rad": "N m", "m": "N", "N": "N", "Pa": "N"}  # by the unit of the coordinate
 
 
@@ -150,7 +156,33 @@ class Actuators:
         except ValueError as error:
             raise ParameterError(field, values, "a number for each actuator, or as many for one as for another") from error
 
-    def checked(self, value: Any, field: str) -> FloatArray:
+    @cached_property
+    def _unusual(self) -> tuple[float, ...]:
+        """Size of each from which on it may be in another unit: an angle beyond its limits and a turn, or a far slide."""
+        sizes = np.abs(self.limits).max(axis=1, initial=0.0)
+        angles = np.where(np.isfinite(sizes), np.maximum(_BEYOND * sizes, 2.0 * np.pi), 4.0 * np.pi)
+        slides = np.arange(len(sizes)) < len(sizes) - len(self.muscle_lengths)
+        return tuple(np.where(self.turning, angles, np.where(slides & (sizes > 0.0), _FAR * sizes, np.inf)).tolist())
+
+    def questioned(self, motors: FloatArray) -> FloatArray:
+        """Return positions, shape (n_motors,); warn (`SuspiciousInputWarning`) if they look like degrees or centimetres.
+
+        Joints without limits may turn many times: they are asked about whole numbers only, as degrees are typed.
+        """
+        if not any(map(gt, map(abs, motors.tolist()), self._unusual)):
+            return motors
+        for place in np.flatnonzero(np.abs(motors) > self._unusual).tolist():
+            value, usual, name = float(motors[place]), float(np.abs(self.limits[place]).max()), self.names[place]
+            if not self.turning[place]:
+                question_length(name, value, usual)
+            elif abs(value) <= _MOST_DEGREES and (math.isfinite(usual) or value == round(value)):
+                question_angle(name, value)
+            else:
+                continue
+            break
+        return motors
+
+    def checked(self, value: Any, field: str = "q_motors") -> FloatArray:
         """Return positions that the robot can have, as a new array; see `SoftModel.checked_motors`."""
         given = value if type(value) is np.ndarray else self.in_order(value, field)
         motors = finite_array(field, given, (len(self.names),), self.described)

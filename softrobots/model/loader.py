@@ -16,7 +16,7 @@ import pinocchio as pin
 from softrobots.constant_curvature.strain_chain import joint_positions
 from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, positive_number
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
-from softrobots.description.sources import Robot, read_source
+from softrobots.description.sources import Robot, named_robot, read_source
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import RobotTags, SectionTag, SpringTag
 from softrobots.model.assembly import assemble, reassemble
@@ -35,7 +35,7 @@ def load_model(
     tip: str | None = None,
     muscles: str | None = None,
 ) -> SoftModel:
-    """Load a robot of this package, or a URDF, MJCF or SDF file.
+    """Load a robot of this package, also by its name in `ROBOTS`, or a URDF, MJCF or SDF file.
 
     The root tag decides which. MJCF (`stiffness`, `springref`; needs MuJoCo) and SDF (`spring_stiffness`,
     `spring_reference`; needs Drake) are translated: `urdf` of the model is the translation, coordinates are those of the file
@@ -44,7 +44,8 @@ def load_model(
     ignored: without `gravity=` the robot is weightless.
 
     Args:
-        source: A robot of this package, a path (`Path` or text), or the text of a description (starting with `<`).
+        source: A robot of this package, its name ("inflatable_arm"; it wins over a file of that name, which `Path` means), a
+            path (`Path` or text), or the text of a description (starting with `<`).
         springs: `{joint: stiffness}` or `{joint: (stiffness, rest)}` [N m/rad or N/m; rad or m], in place of the spring that
             the file gives that joint, if any; None takes it away, and the joint becomes a motor. A stiffness alone keeps the
             rest of the file (0 without one). The other springs of the file stay; `SoftModel.joint_roles` says what became of
@@ -70,6 +71,7 @@ def load_model(
     """
     if muscles is not None:
         choice("muscles", muscles, MUSCLE_INPUTS)
+    source = named_robot(source)
     urdf, label = read_source(source)
     tags = read_tags(urdf, label)
     try:

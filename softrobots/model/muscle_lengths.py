@@ -23,6 +23,7 @@ import numpy as np
 
 from softrobots.constant_curvature.strain_chain import LARGEST_BENDING
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.suspicion import MOST_STRETCH, stretched_too_far
 from softrobots.description.urdf_tags import ActuatorTag
 from softrobots.model.actuator_laws import ROUNDING
 from softrobots.model.coordinates import Coordinates
@@ -65,6 +66,7 @@ class MuscleLengths:
         self._section_lengths = {row.segment: row.length for row in sections}
         self._largest_bending = np.pi / 2 if paths.lumped else LARGEST_BENDING
         self.inner, self.strain_springs, self.paths, self._tags = inner, springs, paths, tuple(tags)
+        self._longest = MOST_STRETCH * np.asarray(paths.rest)
         touched = sorted({segment for tag in tags for segment in tag.segments})
         bends = [[np.array(segments[number][key], dtype=int) for key in ("bend_x", "bend_y")] for number in touched]
         self._bent = [(number, about_x, about_y) for number, (about_x, about_y) in zip(touched, bends, strict=True)]
@@ -165,8 +167,11 @@ class MuscleLengths:
 
         They are positive, one shape explains them, and no section bends beyond its range or loses its length.
         """
-        if np.any(motors[len(motors) - len(self._tags) :] <= 0.0):
+        lengths = motors[len(motors) - len(self._tags) :]
+        if np.any(lengths <= 0.0):
             return "positive muscle lengths [m]"
+        if np.any(lengths > self._longest):
+            return stretched_too_far([tag.name for tag in self._tags], lengths.tolist(), self.paths.rest.tolist())
         strains, gap = self._shape(motors)
         if np.isnan(gap).any():
             return "muscle lengths that a shape of the robot has"

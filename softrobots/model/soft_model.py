@@ -210,7 +210,7 @@ class SoftModel(SummarisedRobot):
                 muscle lengths. This error and the next list the actuators with units and limits.
             NameNotFound: If there is no actuator of a name.
         """
-        return self.actuators.checked(q_motors, field)
+        return self.actuators.questioned(self.actuators.checked(q_motors, field))
 
     def configuration(self, q_motors: Any, q_springs: Any | None = None) -> FloatArray:
         """Pinocchio's configuration vector from actuator and elastic coordinates.

@@ -5,7 +5,7 @@ from functools import partial
 from typing import Any
 
 from softrobots.core.errors import NameNotFound
-from softrobots.description.sources import Robot
+from softrobots.description.sources import NAMED, Robot
 from softrobots.robots.fields import XacroRobot
 from softrobots.robots.helix_tube import HelixTube
 from softrobots.robots.inflatable_arm import InflatableArm
@@ -25,6 +25,7 @@ ROBOTS: Mapping[str, Callable[..., XacroRobot]] = {
     "helix_tube_lumped": partial(HelixTube, chain="lumped"),
 }
 """Constructor of each robot, by the name of its URDF file."""
+NAMED.update(ROBOTS)
 
 
 def robot_class(name: str) -> tuple[Any, Mapping[str, Any]]:

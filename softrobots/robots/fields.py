@@ -18,11 +18,16 @@ import numpy as np
 from softrobots.core.checks import choice, finite_array, finite_number, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.core.field_help import FieldHelp
+from softrobots.core.suspicion import question_angle, question_length
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 
 MOST_PARTS = 1000
 """Largest number of links or segments; xacro takes minutes for that many."""
+
+_FAR = 50.0  # times its default, from which on a length is hardly in m
+_THIN = 1e-3  # [m] walls and wires of any thickness are as usual as thin ones
+_TURNS = 4.0 * np.pi  # angle from which on it is hardly in rad
 
 PerPart = float | Sequence[float]
 """One number for all links or segments, or one for each, base to tip."""
@@ -144,7 +149,7 @@ def check_actuator_parameters(robot: Any, count: int, parts: str, actuators: int
         value, facts = getattr(robot, field.name), field.metadata["facts"]
         if facts.form == "per_actuator" and not (value is None and field.default is None):
             given = numbers(field.name, value, count, facts.unit, parts, actuators)
-            object.__setattr__(robot, field.name, _within(field.name, facts, given))
+            object.__setattr__(robot, field.name, _within(field, given))
 
 
 def refuse_given(robot: Any, names: Sequence[str], requirement: str) -> None:
@@ -186,13 +191,21 @@ def _checked(field: Field[Any], facts: Facts, value: Any, count: int, parts: str
         return _colours(name, value, count, parts)
     each = facts.form == "per_part"
     values = numbers(name, value, count, facts.unit, parts) if each else (finite_number(name, value, facts.unit),)
-    return _within(name, facts, values) if each else _within(name, facts, values)[0]
+    return _within(field, values) if each else _within(field, values)[0]
 
 
-def _within(name: str, facts: Facts, values: tuple[float, ...]) -> tuple[float, ...]:
-    """The numbers, if there are none or all are within the bounds."""
+def _within(field: Field[Any], values: tuple[float, ...]) -> tuple[float, ...]:
+    """The numbers, if there are none or all are within the bounds; asks whether one that is far from the default is meant."""
+    name, facts = field.name, field.metadata["facts"]
     if values and not facts.allow(values):
         raise ParameterError(name, values if len(values) > 1 else values[0], f"{facts.bounds} [{facts.unit}]")
+    largest = max(values, key=abs, default=0.0)
+    default: Any = field.default
+    usual = 0.0 if default is None else float(np.max(default))
+    if facts.unit == "m" and usual >= _THIN and largest >= _FAR * usual:
+        question_length(name, largest, usual)
+    elif facts.unit == "rad" and abs(largest) > _TURNS:
+        question_angle(name, largest)
     return values
 
 

@@ -218,7 +218,7 @@ def start_motors(model: SoftModel, q_motors0: Any) -> FloatArray:
     low, high = model.motor_limits.T
     if q_motors0 is None:
         return np.array(model.relaxed_motors)
-    motors = model.checked_motors(q_motors0, "q_motors0")
+    motors = model.actuators.checked(q_motors0, "q_motors0")
     if np.any((motors < low) | (motors > high)):
         raise ParameterError("q_motors0", q_motors0, f"within the motor limits: {', '.join(model.actuators.described)}")
     return motors

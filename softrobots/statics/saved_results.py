@@ -95,7 +95,7 @@ def _unpack_rows(fields: Mapping[str, Any], forces: FloatArray | None = None, fr
     memories = None if model.structure.friction is None else _memories(fields, model, count)
     equilibria = []
     for row in range(count):
-        model.checked_motors(motors[row])
+        model.actuators.checked(motors[row])
         if memories is not None:
             model = remembering(model, memories[row])
         at = load if forces is None else load.plus(frame, np.append(forces[row], np.zeros(3)))
@@ -138,7 +138,7 @@ def _unpack_solution(fields: Mapping[str, Any]) -> IkSolution:
     target = finite_array("target", fields["target"], (3,), "m")
     others = finite_array("alternatives", fields["alternatives"], (None, equilibrium.model.n_motors), "rad")
     for other in others:
-        equilibrium.model.checked_motors(other, "alternatives")
+        equilibrium.model.actuators.checked(other, "alternatives")
     orientation = checked_orientation(fields["orientation"]) if "orientation" in fields else None
     translation, turn = Goal(target, orientation).missing(equilibrium.model, equilibrium.q)
     if abs(float(fields["error"]) - float(np.linalg.norm(translation))) > 1e-9 * equilibrium.model.reach:
@@ -164,7 +164,7 @@ def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
     point, direction, origin = (read_only(finite_array(name, fields[name], (3,))) for name in ("point", "direction", "origin"))
     normal = read_only(finite_array("normal", fields["normal"], (3,))) if "normal" in fields else None
     probe = Probe(text(fields, "frame"), point, direction, origin, normal)
-    problem = DisplacementControl(model, model.checked_motors(fields["q_motors"][0]), load, probe, TOLERANCE)
+    problem = DisplacementControl(model, model.actuators.checked(fields["q_motors"][0]), load, probe, TOLERANCE)
     springs = finite_array("q_springs", fields["q_springs"][0], (model.n_springs,), "rad")
     probed = problem.at(springs, finite_number("reaction", fields["reaction"], "N"))
     displacement = finite_number("displacement", fields["displacement"], "m")

@@ -218,7 +218,7 @@ def workspace_at(
     if count == 0 or int(refused) < 0 or measures.min() < 0.0:
         raise ParameterError("manipulability", measures, "given for at least one sample, zero or above")
     for row in np.unique(np.linspace(0, count - 1, min(count, 100)).astype(int)):
-        state = elastic_state(model, model.checked_motors(motors[row]), springs[row], load)
+        state = elastic_state(model, model.actuators.checked(motors[row]), springs[row], load)
         if state.error > largest_residual(model, state.scale, 1e-9):
             raise ParameterError("q_springs", springs[row], f"in balance; its row {row} is not")
         tip = frame_placement(model, state.q, model.tip).translation

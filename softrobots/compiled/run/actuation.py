@@ -127,12 +127,12 @@ class Actuation:
         Raises:
             ParameterError: If they are invalid, or a motor position is too large to compute with.
         """
-        motors = self.model.checked_motors(q_motors, field)
+        motors = self.model.actuators.checked(q_motors, field)
         if np.any(np.abs(motors[: self._count]) > LARGEST_POSITION):
             raise ParameterError(
                 field, q_motors, f"within +-{LARGEST_POSITION:g} rad or m at motor joints, for compiled solvers"
             )
-        return motors
+        return self.model.actuators.questioned(motors)
 
     def unknowns(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Return the unknown strains of one case from its elastic coordinates, shape (n,)."""

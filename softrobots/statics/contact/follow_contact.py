@@ -140,6 +140,7 @@ class Course:
                 f"{name}[{key!r}]" if key else name: (one, size, unit) for key, one in several.items() if one is not None
             }
         self._columns = {name: _rows(name, *column) for name, column in columns.items()}
+        first.actuators.questioned(self._columns["q_motors"][0])
         counts = {name: len(rows) for name, rows in self._columns.items() if len(rows) > 1}
         count = len(given) if given is not None else max(counts.values(), default=1)
         for name, number in counts.items():
@@ -167,7 +168,7 @@ class Course:
         environment = self._environment.at(parameter)
         if (model, environment) != self._last[:2]:
             self._last = (model, environment, Surroundings(model, environment))
-        motors = model.checked_motors(row["q_motors"])
+        motors = model.actuators.checked(row["q_motors"])
         return Given(model, motors, replace(load, environment=environment), environment, self._last[2])
 
 

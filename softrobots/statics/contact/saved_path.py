@@ -105,7 +105,7 @@ def _unpack_rows(fields: Mapping[str, Any], friction: float) -> tuple[Equilibriu
         model, chosen = models[robot], slice(touched, touched + size)
         load = load_of_data(model, parse_json(str(fields["loads"][number])))
         environment = check_environment(load.environment)
-        given = Given(model, model.checked_motors(motors[number]), load, environment, Surroundings(model, environment))
+        given = Given(model, model.actuators.checked(motors[number]), load, environment, Surroundings(model, environment))
         own = springs[used : used + model.n_springs]
         row = _state(given, own, friction, points[chosen], forces[chosen], statuses[chosen], iterations[number])
         if not row.residual <= 1.001 * residual[number] + 1e-2 * row.tolerance:

@@ -1,0 +1,116 @@
+"""Numbers in another unit: what looks like degrees or centimetres is asked about once, what no muscle can be is refused."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import softrobots as sr
+from softrobots.cli.main import main
+from softrobots.constant_curvature import arc_from_muscles
+from tests.support import law_robots
+from tests.support.foreign import BRANCHED, SPRINGS
+from tests.support.laws import law
+from tests.support.tables import each_row
+
+ARM = law_robots.model("arm")
+MUSCLES = sr.load_model(sr.PccArm(elastic_sections=1))
+TENDONS = law_robots.model("tendons")
+
+
+def asked(call: Callable[[], Any]) -> list[str]:
+    """Each question of a call, all of which are about the line of this file that asked for it."""
+    with warnings.catch_warnings(record=True) as told:
+        warnings.simplefilter("always")
+        call()
+    found = [one for one in told if issubclass(one.category, sr.SuspiciousInputWarning)]
+    assert all(one.filename == __file__ for one in found)
+    return [str(one.message) for one in found]
+
+
+@law("SuspiciousInputWarning")
+@settings(max_examples=40)
+@given(st.lists(st.floats(-math.pi, math.pi), min_size=3, max_size=3))
+def test_what_is_within_the_limits_is_not_asked_and_the_same_in_degrees_is(angles: list[float]) -> None:
+    """A motor of half a turn each way is asked about beyond 2.5 times that, in one warning."""
+    assert asked(lambda: ARM.checked_motors(angles)) == []
+    degrees = np.degrees(angles)
+    told = asked(lambda: ARM.checked_motors(degrees))
+    beyond = np.flatnonzero(np.abs(degrees) > 2.5 * math.pi).tolist()
+    assert len(told) == min(len(beyond), 1)
+    if beyond:
+        assert told[0].startswith(f"motor_{beyond[0] + 1} = {degrees[beyond[0]]:.6g} rad is")
+        with pytest.warns(sr.SuspiciousInputWarning, match="looks like degrees"):
+            ARM.checked_motors(degrees)
+
+
+CASES: list[tuple[Callable[[], Any], str]] = [
+    (lambda: sr.solve_equilibrium(ARM, (17, 34, -46)), "motor_1 = 17 rad is 974 degrees; it looks like degrees (did you mean "),
+    (lambda: sr.solve_equilibrium(ARM, dict.fromkeys(ARM.actuator_names, 40)), "radians(40) = 0.6981"),
+    (lambda: sr.InflatableArm(stiffness=172.71, link_lengths=(60, 60)), "link_lengths = 60 m is 100 times the usual 0.6 m"),
+    (lambda: sr.InflatableArm(stiffness=172.71, radius=55), "looks like millimetres (did you mean 0.055 m?)"),
+    (lambda: sr.InflatableArm(motor_limit=180), "motor_limit = 180 rad is"),
+    (lambda: sr.TendonArm(tendon_distance=(4.5, 4.5, 4.5), radius=0.006), "tendon_distance = 4.5 m is 1e+03 times the usual"),
+    (lambda: arc_from_muscles([50, 53, 55], 0.04), "72.65 rad, 11.6 turns: are lengths and distance in m?"),
+]
+
+
+@each_row(("call", "text"), CASES)
+def test_another_unit_is_asked_about_once(call: Callable[[], Any], text: str) -> None:
+    told = asked(call)
+    assert len(told) == 1
+    assert text in told[0]
+
+
+@each_row(
+    "call",
+    [
+        lambda: sr.solve_equilibrium(ARM, (3.5, -4.0, 6.0)),  # beyond its limits, as a result says
+        lambda: sr.load_model(BRANCHED, springs=SPRINGS, tip="finger").checked_motors(
+            [100.5, 0.3, 0.0]
+        ),  # turns without limits
+        lambda: sr.InflatableArm(link_lengths=(5.0,), hinge_offset=0.1, radius=0.5, wall_thickness=0.001, stiffness=1e4),
+        lambda: MUSCLES.checked_motors([1.2] * 6),
+        lambda: arc_from_muscles([0.3, 0.5, 0.5], 0.04),
+    ],
+)
+def test_what_is_only_unusual_is_not_asked(call: Callable[[], Any]) -> None:
+    assert asked(call) == []
+
+
+def test_a_joint_without_limits_is_asked_about_whole_numbers() -> None:
+    """Degrees are typed as whole numbers; a wheel that has turned by 90.3 rad is no mistake."""
+    model = sr.load_model(BRANCHED, springs=SPRINGS, tip="finger")
+    place = int(np.flatnonzero(np.isinf(model.motor_limits[:, 0]))[0])
+    turned = np.zeros(model.n_motors)
+    turned[place] = 90.0
+    assert len(asked(lambda: model.checked_motors(turned))) == 1
+    turned[place] = 90.3
+    assert asked(lambda: model.checked_motors(turned)) == []
+
+
+@each_row(("model", "usual"), [(MUSCLES, 0.524), (TENDONS, 0.06)])
+@each_row(("scale", "unit"), [(100.0, "centimetres"), (1000.0, "millimetres")])
+def test_lengths_that_no_muscle_has_are_refused(model: sr.SoftModel, usual: float, scale: float, unit: str) -> None:
+    lengths = scale * model.relaxed_motors
+    with pytest.raises(sr.ParameterError) as caught:
+        sr.solve_equilibrium(model, lengths)
+    length = f"{model.actuator_names[0]} = {scale * usual:.6g} m"
+    assert f"{length} is {scale:.3g} times the usual {usual:g} m; it looks like {unit}" in str(caught.value)
+
+
+@pytest.mark.filterwarnings("default")
+def test_the_command_asks_in_one_line_and_refuses_centimetres(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["solve", "inflatable_arm", "--motors", "17", "34", "-46"]) == 0
+    told = capsys.readouterr().err.splitlines()
+    assert [line.partition(";")[0] for line in told] == ["warning: motor_1 = 17 rad is 974 degrees"]
+    assert main(["pcc", "forward", "50", "53", "55", "54", "51", "52"]) == 2
+    assert "L1 = 50 m is 95.4 times the usual 0.524 m; it looks like centimetres" in capsys.readouterr().err
+    assert main(["pcc", "forward", "50", "53", "55", "54", "51", "52", "--rest", "52", "--distance", "4"]) == 0
