@@ -24,6 +24,9 @@ from tests.support.laws import law
 ONE_LINE = 300
 """Characters of a `repr`, which error messages contain."""
 
+TIMES = np.linspace(0.0, 4.0, 400)
+"""Times of a record of a vibration [s]."""
+
 UNPICKLED = {"load_estimate", "contact_place", "informative_poses", "shaped_trajectory"}
 """Results with a read-only mapping or a function inside, which Python cannot pickle, told or not."""
 
@@ -96,20 +99,13 @@ def every_result() -> dict[str, Any]:
         "pattern": sr.helix.pinch_pattern(design, 0.02),
         "contact_place": sr.locate_contact(held.model, held.q_motors, held.motor_torques, torque_std=0.1, count=2)[0],
         "stability": held.stability,
+        "ring_down": sr.ring_down(TIMES, np.exp(-0.3 * TIMES) * np.cos(12.0 * TIMES) + 1e-4 * np.cos(97.0 * TIMES)),
     }
 
 
 NAMES = [
-    *(
-        "equilibrium",
-        "ik_solution",
-        "load_estimate",
-        "trajectory",
-        "imposed_displacement",
-        "branch",
-        "contact_path",
-        "stability",
-    ),
+    *("equilibrium", "ik_solution", "load_estimate", "trajectory", "imposed_displacement", "branch", "contact_path"),
+    *("stability", "ring_down"),
     *("workspace", "workspace_map", "contact_place", "robot", "link_limits", "characterisation", "vibration_modes", "motion"),
     *("linear_model", "input_shaper", "shaped_trajectory", "measurements", "identification", "cross_validation", "sensitivity"),
     *("informative_poses", "compiled_equilibrium", "equilibria", "forces", "design", "shape", "bent_tube", "pattern"),

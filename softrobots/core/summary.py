@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import math
 from collections.abc import Collection, Iterable, Mapping, Sequence
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
-from softrobots.core.field_help import FieldHelp, field_unit
+from softrobots.core.field_help import FieldHelp, field_unit, with_field_help
+
+Class = TypeVar("Class", bound=type)
 
 MOST_ROWS = 20
 """Rows of a table that a summary shows; of a longer one the first and the last."""
@@ -180,6 +182,13 @@ class Summarised(FieldHelp):
     def __repr__(self) -> str:
         """The class with its names and single numbers in a line; no arrays."""
         return brief(self)
+
+
+def summarised(cls: Class) -> Class:
+    """Give a named tuple, which has no other base, the methods of `Summarised`, and return it."""
+    for name in ("summary_parts", "summary", "_repr_html_", "__str__", "__repr__"):
+        setattr(cls, name, vars(Summarised)[name])
+    return with_field_help(cls)
 
 
 def brief(result: Any) -> str:

@@ -19,12 +19,14 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
 from softrobots.core.errors import NotConverged, ParameterError
+from softrobots.core.summary import summarised
 
 _SAMPLES = 8  # least number of times a mode
 _ROUNDING = 1e-12  # of the range of a signal
 _DECAYS = np.geomspace(0.1, 1e3, 9)  # tried at first, times the length of the record
 
 
+@summarised
 class RingDown(NamedTuple):
     """Modes of a free vibration, slowest first; made by `ring_down`."""
 

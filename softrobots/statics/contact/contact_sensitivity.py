@@ -5,6 +5,7 @@ from __future__ import annotations
 from typing import NamedTuple
 
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.core.summary import summarised
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact import Contact
 from softrobots.statics.contact.pressed_gaps import pressed_gaps, state_in_contact
@@ -12,6 +13,7 @@ from softrobots.statics.equilibrium_result import Equilibrium, check_same_model
 from softrobots.statics.sensitivity import inverse_in_contact, tip_columns
 
 
+@summarised
 class ContactSensitivity(NamedTuple):
     """Derivatives of the k normal forces of an equilibrium whose pressed contacts stay pressed; see `contact_sensitivity`."""
 
