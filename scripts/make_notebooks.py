@@ -1,6 +1,6 @@
 """Run the quick starts of the documentation in a kernel of their own, and store what their cells show in the files.
 
-A view, the cell called `page`, is run and not stored: a page is larger than all the rest of a notebook. Needs the extra `dev`.
+The page with sliders, the cell called `page`, is run and not stored: it is larger than all the rest. Needs the extra `dev`.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""The quick start of each robot runs, shows what is stored in it, and is small; a view needs neither a server nor a port."""
+"""The quick start of each robot runs, shows what is stored in it, and is small; its page needs neither a server nor a port."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ FOLDER = CHECKOUT / "docs" / "notebooks"
 NAMES = tuple(sorted(path.stem for path in FOLDER.glob("*.ipynb")))
 LARGEST = 300_000  # [bytes] of a file with its outputs
 NOT_RUN = "page"
-"""The cell with a view, whose output is not stored: it is larger than all the rest."""
+"""The cell with sliders, whose output is not stored: it is larger than all the rest."""
 
 
 def cells_of(name: str) -> list[dict[str, Any]]:
@@ -80,7 +80,6 @@ def test_it_runs_and_shows_what_is_stored(name: str, tmp_path: Path, monkeypatch
             page = value._repr_html_()
             assert "srcdoc=" in page
             assert "127.0.0.1:7" not in page
-            value.close()
             continue
         pair = [re.sub(r"^residual .*$|<Figure .*>", "", one, flags=re.MULTILINE) for one in (told(cell), text)]
         assert differences(*pair) == [], cell["id"]
