@@ -34,7 +34,7 @@ def stored(path: Path) -> str:
         NotebookClient(notebook, timeout=300, kernel_name="python3", resources={"metadata": {"path": folder}}).execute()
     notebook.metadata = {"kernelspec": notebook.metadata.kernelspec, "language_info": {"name": "python"}}
     for cell in notebook.cells:
-        cell.metadata = {}
+        cell.metadata = {key: cell.metadata[key] for key in ("alt",) if key in cell.metadata}
         if cell.id == "page":
             cell.outputs = []
         for output in cell.get("outputs", ()):

@@ -58,8 +58,9 @@ def test_each_robot_has_one_that_stores_what_it_shows() -> None:
             assert bool(cell["outputs"]) == (cell["id"] != NOT_RUN), cell["id"]
             kinds = [output["output_type"] for output in cell["outputs"]]
             assert set(kinds) <= {"stream", "execute_result"}, "a warning, an error"
-        pictures = [cell["id"] for cell in cells for output in cell["outputs"] if "image/png" in output.get("data", {})]
-        assert "picture" in pictures
+        drawn = [cell for cell in cells for output in cell["outputs"] if "image/png" in output.get("data", {})]
+        assert "picture" in [cell["id"] for cell in drawn]
+        assert all(len(cell["metadata"]["alt"]) > 20 for cell in drawn)
     tables = [output["data"] for cell in cells_of("inflatable_arm") for output in cell["outputs"] if "data" in output]
     assert sum("<table" in "".join(data.get("text/html", "")) for data in tables) >= 2
 
