@@ -10,6 +10,7 @@ from pathlib import Path
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import new_file
 from softrobots.view.browser import take_picture
+from studies.gallery.live_pages import LIVE_PAGES
 from studies.gallery.moving_picture import take_animation
 from studies.gallery.scenes import EXHIBITS
 
@@ -39,7 +40,7 @@ def main(argv: list[str] | None = None) -> int:
     """Photograph each robot under load."""
     parser = argparse.ArgumentParser(description=__doc__)
     folder = Path(__file__).resolve().parent.parent / "docs" / "images"
-    names = (*PICTURES, ANIMATION)
+    names = (*PICTURES, ANIMATION, *LIVE_PAGES)
     parser.add_argument(
         "--output", type=Path, default=folder, metavar="FOLDER", help="folder of the pictures, which are replaced (docs/images)"
     )
@@ -50,6 +51,11 @@ def main(argv: list[str] | None = None) -> int:
         files = {name: name if name == ANIMATION else f"{name}.png" for name in arguments.only}
         targets = {name: new_file(arguments.output / file, overwrite=True) for name, file in files.items()}
         for name, target in targets.items():
+            if name in LIVE_PAGES:
+                with tempfile.TemporaryDirectory() as folder_name:
+                    page = LIVE_PAGES[name].write(Path(folder_name) / "page.html")
+                    print(take_picture(page, target, width=1000, height=560))
+                continue
             exhibit = EXHIBITS[name.removesuffix(".gif")]
             with tempfile.TemporaryDirectory() as folder_name, exhibit.make() as viewer:
                 page = viewer.write_html(Path(folder_name) / "scene.html", title=exhibit.title)

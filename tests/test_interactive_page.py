@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import runpy
 from collections.abc import Callable, Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,8 @@ import softrobots as sr
 from softrobots.view.body import body
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.slider_ranges import visible_force
+from studies.gallery.live_pages import LIVE_PAGES
+from tests.conftest import CHECKOUT
 
 ROBOTS: dict[str, Callable[[], Any]] = {
     "arm": sr.InflatableArm,
@@ -302,6 +305,21 @@ def test_the_page_works_in_the_frame_of_a_notebook(browser: Any, models: dict[st
     tab.close()
 
 
+def test_the_example_of_the_guide_talks_to_the_page_in_its_frame(browser: Any, files: dict[str, Path]) -> None:
+    guide = (CHECKOUT / "docs" / "watch.md").read_text(encoding="utf-8")
+    example = guide.split("```html\n")[1].split("```")[0]
+    texts = {"http://arm.test/": example, "http://arm.test/live_arm.html": files["arm"].read_text(encoding="utf-8")}
+    tab, messages = browser.new_page(viewport={"width": 800, "height": 640}), []
+    tab.on("pageerror", lambda error: messages.append(str(error)))
+    tab.route("**/*", lambda route: route.fulfill(body=texts.get(route.request.url, ""), content_type="text/html"))
+    tab.goto("http://arm.test/")
+    frame = tab.frames[1]
+    frame.wait_for_function("window.softrobots?.shown?.gravity")
+    assert frame.evaluate("softrobots.shown.motors") == [0.3, 0.2, -0.8]
+    assert messages == []
+    tab.close()
+
+
 def test_pages_are_small_and_the_same_again(arm: sr.SoftModel, tmp_path: Path) -> None:
     file = sr.write_interactive(arm, tmp_path / "arm.html", title="<Arm> & co")
     text = file.read_text(encoding="utf-8")
@@ -320,3 +338,25 @@ def test_pages_are_small_and_the_same_again(arm: sr.SoftModel, tmp_path: Path) -
 
 def test_pages_of_long_robots_are_small(files: dict[str, Path]) -> None:
     assert max(file.stat().st_size for file in files.values()) < 2_500_000
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("name", LIVE_PAGES)
+def test_pages_of_the_documentation_are_up_to_date(name: str, tmp_path: Path) -> None:
+    again = LIVE_PAGES[name].write(tmp_path / "page.html").read_bytes()
+    assert again == (CHECKOUT / "docs" / "pages" / f"{name}.html").read_bytes(), "python scripts/make_pages.py makes them again"
+
+
+@pytest.mark.study
+def test_guides_begin_with_a_page_which_the_site_shows() -> None:
+    hook = runpy.run_path(str(CHECKOUT / "docs" / "site" / "embedded_pages.py"))["on_page_content"]
+    pages = {"inflatable_arm": "inflatable_arm", "pcc_arm": "pcc_arm", "actuators": "tendon_arm", "helix": "helix_tube"}
+    for guide, name in pages.items():
+        text = (CHECKOUT / "docs" / f"{guide}.md").read_text(encoding="utf-8")
+        ((words, picture, page),) = re.findall(
+            r"^\[!\[(.+)\]\((images/\w+\.png)\)\]\((pages/live_\w+\.html)\)$", text, re.MULTILINE
+        )
+        assert page == f"pages/live_{name}.html"
+        shown = hook(f'<p><a href="{page}"><img alt="{words}" src="{picture}" /></a></p>')
+        assert f'<iframe class="live" src="{page}" title="{words}" loading="lazy"></iframe>' in shown
+        assert "<img" not in shown

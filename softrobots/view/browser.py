@@ -93,12 +93,16 @@ def open_page(html: str | Path, picture: str | Path, width: int, height: int) ->
     with open_browser() as browser:
         page = browser.new_page(viewport={"width": width, "height": height})
         page.goto(page_file.resolve().as_uri())
-        page.add_style_tag(content="#softrobots-hint, .dg { display: none !important; }")
+        page.add_style_tag(content="#softrobots-hint, #hint, #toggle, .dg { display: none !important; }")
         yield page, target
 
 
 def show_share(page: Any, share: float) -> None:
     """Wait until a viewer page has drawn its scene, and stop its animation at a share of its duration, from 0 to 1."""
+    if page.evaluate("Boolean(window.softrobots)"):  # a page that solves by itself
+        page.evaluate("softrobots.ready.then(() => true)")
+        page.evaluate(_FRAMES)
+        return
     page.wait_for_function(_SETTLED)
     page.evaluate("share => { viewer.animator.pause(); viewer.animator.seek(share * viewer.animator.duration); }", share)
     page.evaluate(_TWO_FRAMES)
@@ -117,6 +121,7 @@ _SETTLED = """async () => {
   }
   return true;
 }"""
+_FRAMES = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
 _TWO_FRAMES = """() => new Promise(done => {
   viewer.set_dirty();
   requestAnimationFrame(() => { viewer.render(); requestAnimationFrame(() => done(true)); });

@@ -119,7 +119,7 @@ def _legend(model: SoftModel, data: dict[str, Any]) -> list[LegendEntry]:
     entries += [LegendEntry(LINE_COLOUR, name) for name in (*lines, *["actuators"] * (len(lines) < len(data["curves"])))]
     above = 1.0
     for least, colour in WRINKLING_COLOURS if model.spring_groups else ():
-        words = f"{100 * above:.0f} - {100 * least:.0f} % of the wrinkling moment left" if np.isfinite(least) else "wrinkled"
+        words = f"{100 * least:.0f} - {100 * above:.0f} % left to wrinkling" if np.isfinite(least) else "wrinkled"
         entries.append(LegendEntry(colour, words))
         above = least
     return entries

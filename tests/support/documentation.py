@@ -8,7 +8,8 @@ The rules, for whoever writes a page:
 - ```` ```sh ```` is run line by line (a backslash joins lines), `softrobots ...` and `python scripts/...` in this process. Each
   must end with status 0; `# status 1` at the end of a line says otherwise.
 - ```` ```console ```` holds `$ command` lines, each with its output.
-- ```` ```math ```` must become MathML, ```` ```xml ```` must be well-formed, ```` ```c ```` is left to a test of its own.
+- ```` ```math ```` must become MathML, ```` ```xml ```` must be well-formed, ```` ```c ```` and ```` ```html ```` are left to
+  tests of their own.
 - `<!-- not run: reason -->` in the line before a block keeps it from running. What it types is still parsed: options of
   `softrobots` and of our scripts, Python's grammar.
 - `<!-- first: code -->` before a block of Python runs lines that readers need not see, e.g. to make a file that it reads.
@@ -41,7 +42,7 @@ from softrobots.cli import main as cli
 from softrobots.core.errors import MissingDependency
 from tests.conftest import CHECKOUT
 
-LANGUAGES = ("python", "py", "text", "sh", "console", "math", "xml", "c")
+LANGUAGES = ("python", "py", "text", "sh", "console", "math", "xml", "c", "html")
 PROGRAMS = ("softrobots", "python", "cat", "ls", "head", "gcc", "mkdir")
 """What lines of a shell may start with."""
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?(?![\w])")
@@ -169,7 +170,7 @@ class PageRunner:
         if block.file:
             Path(block.file).write_text(block.text, encoding="utf-8")
             return None
-        if language in ("math", "c", "xml"):
+        if language in ("math", "c", "xml", "html"):
             return None
         if block.reason:
             self._parse(block, language)

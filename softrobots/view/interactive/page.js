@@ -79,7 +79,7 @@ function startPage() {
     }));
   }
   function told(links) { // each link, or of many the nearest to wrinkling
-    const rows = links.map((link) => [link.wrinklingMargin, link.name]);
+    const rows = links.map((link, number) => [link.wrinklingMargin, data.links[number]]);
     if (rows.length <= 4) return rows;
     const [share, name] = rows.reduce((least, row) => (row[0] < least[0] ? row : least));
     return [[share, `least of ${rows.length}, ${name}`]];
@@ -281,7 +281,8 @@ function startPage() {
   addEventListener("hashchange", readAddress);
 
   // The loop: solves when something is asked for, draws when something has changed.
-  function frame() {
+  let last = 0, slow = 0;
+  function frame(now) {
     if (dragging?.at && shown) {
       const target = scene.under(...dragging.at);
       if (target && (mode() === "force" ? pull(target) : reach(target))) refresh();
@@ -289,11 +290,14 @@ function startPage() {
     }
     if (asked) { asked = false; attempt(solveShown); }
     if (scene.dirty) {
+      slow = now - last < 400 && now - last > 45 ? slow + 1 : 0; // between two drawn frames [ms]
+      last = now;
+      if (slow === 8) scene.simplify();
       scene.draw();
       const [x, y] = scene.onScreen(scene.tip), [ax, ay] = scene.onScreen(scene.arrowEnd), newtons = Math.hypot(...(shownFor?.force ?? [0]));
       tip.style.transform = `translate(${x}px, ${y}px)`;
       $("newtons").hidden = !scene.arrow.visible;
-      $("newtons").textContent = `${newtons.toPrecision(3)} N`;
+      $("newtons").textContent = `${Number(newtons.toPrecision(3))} N`;
       const wide = $("newtons").offsetWidth, left = Math.max(4, Math.min(canvas.clientWidth - wide - 4, ax - (ax < x ? wide + 6 : -6)));
       $("newtons").style.transform = `translate(${left}px, ${Math.max(4, Math.min(canvas.clientHeight - 26, ay - 12))}px)`;
     }
@@ -309,7 +313,7 @@ function startPage() {
   readAddress();
   attempt(solveShown);
   scene.refit = true;
-  frame();
+  frame(performance.now());
   return Object.defineProperties(window.softrobots, Object.getOwnPropertyDescriptors({
     robot: { name: data.name, actuators: actuators.map(({ name, unit, lower, upper, relaxed }) => ({ name, unit, lower, upper, relaxed })), springs: solver.springs },
     solve: (given = {}) => answer({ motors: relaxed, ...input(given) }),

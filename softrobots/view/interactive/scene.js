@@ -106,8 +106,7 @@ class RobotScene {
       this.#add(drawn.mesh, true);
       return { ...curve, drawn };
     });
-    const green = look(HEX(data.colours.force)), width = 0.009 * data.size;
-    green.emissive = HEX(data.colours.force).multiplyScalar(0.35);
+    const green = new THREE.MeshLambertMaterial({ color: data.colours.force, emissive: data.colours.force, emissiveIntensity: 0.15 }), width = 0.009 * data.size;
     this.arrow = new THREE.Group();
     this.shaft = new THREE.Mesh(new THREE.CylinderGeometry(width, width, 1, 20), green);
     this.head = new THREE.Mesh(new THREE.ConeGeometry(2.6 * width, 7 * width, 24), green);
@@ -150,6 +149,7 @@ class RobotScene {
     const sheet = new THREE.Mesh(new THREE.PlaneGeometry(6 * size, 6 * size), new THREE.ShadowMaterial({ opacity: 0.16 }));
     sheet.position.set(centre[0], centre[1], ground - 1e-3 * size);
     sheet.receiveShadow = true;
+    this.shadows = [sun, sheet];
     this.scene.add(sun, sun.target, fill, new THREE.LineSegments(floor, new THREE.LineBasicMaterial({ color: colours.floor })), sheet);
   }
 
@@ -245,24 +245,29 @@ class RobotScene {
     this.dirty = true;
   }
 
-  fit() {
-    const box = new THREE.Box3();
-    this.scene.updateMatrixWorld();
-    for (const { mesh } of this.solids) box.expandByObject(mesh);
-    for (const { drawn } of [...this.tubes, ...this.curves]) box.union(new THREE.Box3().setFromBufferAttribute(drawn.geometry.attributes.position));
-    box.expandByPoint(this.arrowEnd);
-    const centre = box.getCenter(new THREE.Vector3()), { width, height } = this, { turn, rise } = this.view;
+  fit() { // the smallest distance at which all is in the window, below its title
+    const points = [this.arrowEnd.clone(), this.tip.clone()], { width, height } = this, { turn, rise } = this.view;
+    for (const { mesh } of this.solids) {
+      mesh.geometry.computeBoundingBox();
+      const { min, max } = mesh.geometry.boundingBox;
+      for (let corner = 0; corner < 8; corner++) {
+        const at = ["x", "y", "z"].map((axis, bit) => (corner >> bit & 1 ? max : min)[axis]);
+        points.push(vector(at).applyMatrix4(mesh.matrix));
+      }
+    }
+    for (const { drawn } of this.tubes) {
+      const { array } = drawn.geometry.attributes.position;
+      for (let at = 0; at < array.length; at += 21) points.push(vector(array.subarray(at, at + 3)));
+    }
     const towards = new THREE.Vector3(Math.cos(turn) * Math.cos(rise), Math.sin(turn) * Math.cos(rise), Math.sin(rise));
     const right = new THREE.Vector3(-Math.sin(turn), Math.cos(turn), 0), up = towards.clone().cross(right);
-    const high = Math.tan(0.5 * THREE.MathUtils.degToRad(this.camera.fov)) * Math.max(0.5, 1 - 150 / height);
-    const wide = high * this.camera.aspect * Math.max(0.5, 1 - 90 / width) / Math.max(0.5, 1 - 150 / height);
-    let distance = 0;
-    for (let corner = 0; corner < 8; corner++) {
-      const at = new THREE.Vector3(...["x", "y", "z"].map((axis, bit) => (corner >> bit & 1 ? box.max : box.min)[axis])).sub(centre);
-      distance = Math.max(distance, at.dot(towards) + Math.max(Math.abs(at.dot(right)) / wide, Math.abs(at.dot(up)) / high));
-    }
-    this.view.target.copy(centre);
-    this.view.distance = distance;
+    const seen = points.map((point) => [right, up, towards].map((axis) => point.dot(axis)));
+    const middle = [0, 1, 2].map((axis) => 0.5 * (Math.min(...seen.map((one) => one[axis])) + Math.max(...seen.map((one) => one[axis]))));
+    const slope = Math.tan(0.5 * THREE.MathUtils.degToRad(this.camera.fov));
+    const high = slope * Math.max(0.5, 1 - 160 / height), wide = slope * this.camera.aspect * Math.max(0.5, 1 - 110 / width);
+    this.view.distance = Math.max(...seen.map(([x, y, z]) => z - middle[2] + Math.max(Math.abs(x - middle[0]) / wide, Math.abs(y - middle[1]) / high)));
+    const low = this.view.distance * slope * Math.min(0.12, 30 / height); // the title takes more room than the hint
+    this.view.target.set(0, 0, 0).addScaledVector(right, middle[0]).addScaledVector(up, middle[1] + low).addScaledVector(towards, middle[2]);
   }
 
   turn(right, up) {
@@ -282,6 +287,13 @@ class RobotScene {
 
   axes() { // of the screen, in the world: right, up, towards the viewer
     return [0, 1, 2].map((column) => new THREE.Vector3().setFromMatrixColumn(this.camera.matrixWorld, column));
+  }
+
+  // Without shadows, where a browser draws in software.
+  simplify() {
+    const [sun, sheet] = this.shadows;
+    sun.castShadow = sheet.visible = false;
+    this.dirty = true;
   }
 
   draw() {
