@@ -3,10 +3,8 @@
 import importlib
 from typing import TYPE_CHECKING, Any
 
-import softrobots.dynamics.saved_modes
 import softrobots.dynamics.saved_motion
 import softrobots.identification.saved_identification
-import softrobots.identification.saved_measurements
 import softrobots.statics.contact.saved_path  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
 from softrobots.core.data_frame import to_dataframe

@@ -475,7 +475,7 @@ def test_encrypted_and_doubled_members_are_refused(tmp_path: Path) -> None:
 
 
 def saved(tmp_path: Path, kind: str, changes: dict[str, Any]) -> Path:
-    with np.load(io.BytesIO(data.result_corpus()[list(KINDS).index(kind)])) as file:
+    with np.load(io.BytesIO(data.result_corpus()[list(data.results()).index(kind)])) as file:
         fields = {**file, **changes}
     np.savez(tmp_path / "a.npz", **{name: value for name, value in fields.items() if value is not None})
     return tmp_path / "a.npz"
@@ -557,7 +557,7 @@ def test_results_that_claim_what_they_are_not(kind: str, changes: dict[str, Any]
 
 @each_row("kind", KINDS)
 def test_cut_off_anywhere_a_result_is_refused(kind: str, tmp_path: Path) -> None:
-    content = data.result_corpus()[list(KINDS).index(kind)]
+    content = data.result_corpus()[list(data.results()).index(kind)]
     for end in range(0, len(content), len(content) // 12):
         (tmp_path / "a.npz").write_bytes(content[:end])
         with pytest.raises(sr.FileFormatError, match="it is not an NPZ archive"):

@@ -1,4 +1,8 @@
-"""Serialisation of fits: the fitted robot, the measurements, and what was found; residuals are computed again."""
+"""Serialisation of measurements and fits.
+
+A file of measurements holds their table and the mapping that reads it. One of a fit holds the fitted robot, the measurements
+and what was found; residuals are computed again.
+"""
 
 from __future__ import annotations
 
@@ -10,13 +14,14 @@ from typing import Any
 
 import numpy as np
 
-import softrobots.identification.saved_measurements  # noqa: F401  (adds the kind that the rows are saved as)
 from softrobots.core.checks import FloatArray, finite_array
 from softrobots.core.errors import FileFormatError
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, Kind, counts, label, text
 from softrobots.identification.identification import Comparison, History, Identification
 from softrobots.identification.measurement_checks import difference, with_gaps
+from softrobots.identification.measurement_table import arguments_of_table, table_of
+from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameter_names import Parameter, Place
 from softrobots.identification.uncertainty import Uncertainty
 from softrobots.robots import HelixTube, InflatableArm, PccArm, TendonArm
@@ -24,6 +29,32 @@ from softrobots.statics.loads import Load
 from softrobots.statics.saved_results import pack_model, unpack_model
 
 _ROBOTS = {kind.__name__: kind for kind in (HelixTube, InflatableArm, PccArm, TendonArm)}
+
+
+def _pack_measurements(measurements: Measurements) -> dict[str, Any]:
+    table, mapping = table_of(measurements.arguments())
+    label = table.pop("label", None)
+    numbers = np.column_stack([np.asarray(column, dtype=float) for column in table.values()])
+    own = {"columns": json.dumps(mapping), "names": list(table), "numbers": numbers, "lines": measurements.lines}
+    return own | {"labels": None if label is None else list(label)}
+
+
+def _unpack_measurements(fields: Mapping[str, Any]) -> Measurements:
+    columns = parse_json(text(fields, "columns"))
+    table = dict(zip(fields["names"].tolist(), with_gaps("numbers", fields["numbers"], (None, None), "").T, strict=True))
+    if "labels" in fields:
+        table["label"] = fields["labels"].tolist()
+    return Measurements(**arguments_of_table(table, columns), lines=fields.get("lines"))
+
+
+KINDS["measurements"] = Kind(
+    Measurements,
+    _pack_measurements,
+    _unpack_measurements,
+    many=True,
+    to_table=lambda measurements: table_of(measurements.arguments())[0],
+    reading=lambda measurements: table_of(measurements.arguments())[1],
+)
 
 
 def _pack(found: Identification) -> dict[str, Any]:

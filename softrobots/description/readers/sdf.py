@@ -7,6 +7,8 @@ read.
 
 from __future__ import annotations
 
+import math
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -16,7 +18,6 @@ import numpy as np
 from softrobots.core.checks import read_only
 from softrobots.core.errors import DescriptionError, MissingDependency
 from softrobots.core.xml_input import parse_xml
-from softrobots.description.readers.sdf_refusals import not_carried
 from softrobots.description.readers.sdf_shapes import collision_shapes, placement_of, visible_shapes
 from softrobots.description.readers.sdf_text import warnings_of_drake, without_drawings
 from softrobots.description.readers.tree_builder import TreeBuilder
@@ -54,7 +55,7 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
         DescriptionError: If Drake refuses it, or finds no model or an invalid inertia; if several models move or a body is not
             fixed to the world; if bodies form a loop; or if it has other joints than revolute, continuous, prismatic and fixed
             ones, other force elements than springs, constraints, or a feature listed in
-            `softrobots.description.readers.sdf_refusals`.
+            `softrobots.description.readers.sdf`.
     """
     with MissingDependency.of_imports("drake", "interop"):
         from pydrake.multibody.parsing import Parser
@@ -64,7 +65,7 @@ def read_sdf(text: str, source: str, path: Path | None = None) -> RigidTree:
         count = sum(1 for _ in root.iter(kind))
         if count > most:
             raise DescriptionError(f"{source} has {count} {kind}s; at most {most} are read")
-    reasons = not_carried(root)
+    reasons = _not_carried(root)
     plant = MultibodyPlant(1e-3)  # discrete, because continuous plants refuse constraints
     if not reasons:
         try:
@@ -218,3 +219,64 @@ def _items(get: Any, index: str, count: int) -> Iterator[Any]:
     from pydrake.multibody import tree
 
     return (get(getattr(tree, index)(number)) for number in range(count))
+
+
+def _not_carried(root: ElementTree.Element) -> list[str]:
+    """Return the unsupported features of a document, with reasons.
+
+    Drake drops dry friction and mimic joints silently, ends the process at a negative stiffness or a NaN limit, and replaces a
+    mass that is not positive by 1 kg.
+    """
+    found = []
+    if next(root.iter("include"), None) is not None:
+        found.append("included files (they cannot be checked before Drake reads them; `gz sdf -p` merges them)")
+    for link in root.iter("link"):
+        found += _features_of_link(link)
+        if any(str(element.tag).endswith("deformable_properties") for element in link):
+            found.append(f"the deformable link {link.get('name')} (a chain of joints with springs is supported)")
+    for joint in root.iter("joint"):
+        found += _features_of_joint(joint)
+    return found
+
+
+def _features_of_link(link: ElementTree.Element) -> list[str]:
+    name, found = link.get("name", ""), []
+    mass = link.find("inertial/mass")
+    if mass is not None and not 0.0 < _number(mass) < math.inf:
+        found.append(f"the mass {mass.text} of link {name} (a positive one is required)")
+    for tag, usual, why in (
+        ("gravity", "true", "every link has its full weight"),
+        ("kinematic", "false", "loads move every link"),
+    ):
+        value = link.findtext(tag, usual).strip().lower()
+        if value not in (usual, "1" if usual == "true" else "0"):
+            found.append(f"<{tag}>{value}</{tag}> of link {name} ({why})")
+    return found
+
+
+def _features_of_joint(joint: ElementTree.Element) -> list[str]:
+    name, found = joint.get("name", ""), []
+    if any((element.text or "").strip().lower().lstrip("+-").startswith("nan") for element in joint.iter()):
+        found.append(f"a NaN in joint {name}")
+    for axis in (*joint.findall("axis"), *joint.findall("axis2")):
+        stiffness, reference, friction = (
+            _number(axis.find(f"dynamics/{name}")) for name in ("spring_stiffness", "spring_reference", "friction")
+        )
+        if not 0.0 <= stiffness < math.inf or not math.isfinite(reference):
+            found.append(
+                f"stiffness {stiffness:g} and rest {reference:g} of joint {name} (finite ones are required, not negative)"
+            )
+        elif stiffness > 0.0 and friction != 0.0:
+            found.append(f"joint {name} with spring and dry friction (its equilibrium is not unique)")
+        if axis.find("mimic") is not None:
+            found.append(f"the mimic of joint {name} (couplings are not supported)")
+    return found
+
+
+def _number(element: ElementTree.Element | None) -> float:
+    if element is None:
+        return 0.0
+    try:
+        return float(element.text or "")
+    except ValueError:
+        return math.nan
