@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots import inflated_beam
-from softrobots.inflated_beam.characterisation_data import COLUMNS
+from softrobots.inflated_beam.characterisation import COLUMNS
 from tests.support.laws import law
 from tests.support.tables import each_row
 

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.description.argument_notes import argument_notes
+from softrobots.description.expansion import argument_notes
 from softrobots.description.paths import urdf_folder
 from softrobots.export import export_model, to_json
 from softrobots.inflated_beam import wrinkling_moment

@@ -15,11 +15,12 @@ from softrobots.inflated_beam.bending_test import BendingTest
 from softrobots.inflated_beam.characterisation import (
     MEAN_STIFFNESS,
     TABLE_3,
+    BendingData,
     CharacterisationRow,
     moment,
+    read_characterisation,
     required_tabulated_pressure,
 )
-from softrobots.inflated_beam.characterisation_data import BendingData, read_characterisation
 from softrobots.inflated_beam.characterisation_fit import Characterisation, fit_characterisation
 from softrobots.inflated_beam.inflation import tank_pressure, tank_volume, volume
 from softrobots.inflated_beam.membrane_tube import MomentLimits, SlackWallMoment, moment_limits, slack_wall_moment

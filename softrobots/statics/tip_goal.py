@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import combinations
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array
-from softrobots.core.errors import ParameterError
+from softrobots.core.errors import NeutralEquilibrium, ParameterError
 from softrobots.model.friction_coordinates import slipping
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.contact.pressed_gaps import motor_slopes, pressed_gaps
-from softrobots.statics.contact.release import released
+from softrobots.statics.contact.pressed_gaps import PressedGaps, motor_slopes, pressed_gaps
 from softrobots.statics.elastic_state import ElasticState, elastic_state
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
-from softrobots.statics.sensitivity import tip_motion
+from softrobots.statics.sensitivity import inverse_in_contact, tip_motion
 from softrobots.statics.tip_search import LEVER, LocalSolution
 from softrobots.statics.tip_steps import Pull, TipModel, pull
+
+_MOST_OPENED = 4  # pressed contacts beyond which each opens alone, or all of them
 
 
 class Goal(NamedTuple):
@@ -173,7 +175,7 @@ class LoadedTip:
         return tip_motion(self.model, motors, springs, state.tangent, state.load.coupling, pressed_gaps(state))
 
     def released(self, state: ElasticState, held: TipModel, damping: float) -> list[TipModel]:
-        """Return the models in which pressed contacts open, see `softrobots.statics.contact.release`."""
+        """Return the models in which pressed contacts open, see `softrobots.statics.tip_goal`."""
         pressed = pressed_gaps(state)
         if pressed is None:
             return []
@@ -215,3 +217,42 @@ def checked_orientation(value: Any) -> FloatArray | None:
 
 def _is_rotation(matrix: FloatArray, tolerance: float = 1e-9) -> bool:
     return bool(np.allclose(matrix @ matrix.T, np.eye(3), rtol=0.0, atol=tolerance) and np.linalg.det(matrix) > 0.0)
+
+
+def released(
+    state: ElasticState, pressed: PressedGaps, motors: FloatArray, springs: FloatArray, held: TipModel, damping: float
+) -> list[TipModel]:
+    """Return the models of the tip in which some of the pressed contacts open: how a robot follows once it leaves an obstacle.
+
+    While contacts stay pressed the tip moves along the obstacle only. To leave it, the actuators first take over the force of
+    the contact: without it the springs would be elsewhere by `-P G^T lambda`, with `P` the inverse of the stiffness beside the
+    contacts that stay. From there the robot follows as without the contact. The linear model is that of a complementarity
+    problem on the branch on which those contacts are open; it holds where its step opens them.
+
+    Args:
+        state: The robot in equilibrium.
+        pressed: Its pressed contacts.
+        motors: Rows of the tip Jacobian, columns per actuator, shape (rows, n_motors).
+        springs: The same rows, columns per elastic coordinate, shape (rows, n_springs).
+        held: The model in which all stay pressed.
+        damping: Damping of the step that must open them [m].
+
+    Returns:
+        The models, those that their own step contradicts left out.
+    """
+    count, models = len(pressed.forces), list[TipModel]()
+    sizes = range(1, count + 1) if count <= _MOST_OPENED else (1, count)
+    for opened in (list(some) for size in sizes for some in combinations(range(count), size)):
+        kept = np.setdiff1d(np.arange(count), opened)
+        try:
+            inverse = inverse_in_contact(state.model, state.tangent, pressed.by_springs[kept])
+        except NeutralEquilibrium:  # these contacts keep the robot from buckling
+            continue
+        follow = inverse.springs_by_load @ state.load.coupling - inverse.springs_by_gap @ pressed.by_motors[kept]
+        shift = -inverse.springs_by_load @ (pressed.forces[opened] @ pressed.by_springs[opened])
+        model = TipModel(held.missing - springs @ shift, motors + springs @ follow, follow, shift)
+        step = model.step(state.model.actuators.basis, damping)
+        gaps = pressed.by_springs[opened] @ (shift + follow @ step) + pressed.by_motors[opened] @ step
+        if gaps.min() > 0.0:
+            models.append(model)
+    return models

@@ -12,8 +12,7 @@ from typing import Any, NamedTuple
 
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError
 from softrobots.core.yaml_text import parse_yaml
-from softrobots.description.argument_notes import argument_notes
-from softrobots.description.expansion import declared_arguments
+from softrobots.description.expansion import argument_notes, declared_arguments
 from softrobots.robots import ROBOTS, XacroRobot, robot_class
 from softrobots.robots.fields import facts_of
 from softrobots.robots.parameter_file import write_parameters

@@ -23,9 +23,8 @@ from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
 from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.trace.blocks import Block, hoist
+from softrobots.compiled.trace.blocks import Block, TableColumns, hoist
 from softrobots.compiled.trace.expressions import Expression, Scalar
-from softrobots.compiled.trace.tables import TableColumns
 
 
 @dataclass

@@ -29,9 +29,8 @@ from softrobots.compiled.chain.looped_chain import Kind
 from softrobots.compiled.chain.motion_groups import ElementParts, MovingGroup, group_signature, motion_groups, moving_parts
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import MovingFrame, moved, wrench
-from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.expressions import Expression, Scalar
-from softrobots.compiled.trace.tables import TableColumns
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,8 @@ from softrobots.compiled.chain.moving_joints import JointState, RigidBody, Secti
 from softrobots.compiled.chain.muscle_terms import pulls_on
 from softrobots.compiled.chain.recursion import TracedElement, range_margin
 from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.expressions import Scalar, if_less
-from softrobots.compiled.trace.tables import TableColumns
 from softrobots.core.checks import FloatArray
 from softrobots.model.serial_chain import ChainBody, ChainJoint, bodies_of
 

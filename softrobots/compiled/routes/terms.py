@@ -19,9 +19,8 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import is_zero, outer, upper_triangle, vector
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.expressions import Scalar, larger, smaller, square_root
-from softrobots.compiled.trace.tables import TableColumns
 from softrobots.model.serial_chain import strains_of
 
 SHORTEST = 1e-3

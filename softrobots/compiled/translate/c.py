@@ -14,9 +14,9 @@ from functools import cache
 from pathlib import Path
 
 from softrobots.compiled.translate.dialect import Dialect, Part, bare
+from softrobots.compiled.translate.functions import translated
 from softrobots.compiled.translate.kernel_language import Function, Module
 from softrobots.compiled.translate.lines import comment, wrapped
-from softrobots.compiled.translate.modules import translated
 
 _TYPES = {"none": "void", "int": "int", "bool": "int", "float": "double"}
 _NEED_WIDE_INTEGERS = ("floor", "sqrt")  # intrinsics that need <stdint.h>

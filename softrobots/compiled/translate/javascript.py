@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from softrobots.compiled.translate.dialect import Dialect, Part, bare
+from softrobots.compiled.translate.functions import Translated, translated
 from softrobots.compiled.translate.kernel_language import Function
-from softrobots.compiled.translate.modules import Translated, translated
 
 _INTRINSICS = {"floor": "(Math.floor({}) + 0.0)", "fabs": "Math.abs({})", "sqrt": "Math.sqrt({})", "where": "({} ? {} : {})"}
 
