@@ -10,6 +10,8 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.compiled.drivers import intrinsics
@@ -121,17 +123,18 @@ def test_refusals(text: str, word: str) -> None:
 
 
 @law("CompiledModel.js_source")
-@pytest.mark.parametrize("name", ["arm", "helix"])
-def test_script_is_self_contained(name: str) -> None:
+@given(name=st.sampled_from(["arm", "helix"]), points=st.integers(1, 8))
+@settings(max_examples=3)
+def test_script_is_self_contained(name: str, points: int) -> None:
     """Every name of the kernel that the text uses is declared in it once; nothing is imported, and no tag of a page ends it."""
-    text = script(name)
+    text = compiled(name).js_source(points=points)
     used = set(re.findall(r"\$(\w+)", text)) - (set() if compiled(name).model.muscles else {"put_muscles"})
     declared = re.findall(r"^(?:const|function) \$(\w+)", text, re.MULTILINE)
     assert sorted(declared) == sorted(used)
     assert not re.search(r"\bimport\b|\brequire\b|\bfetch\b|</|<!--", text)
     assert text.count("makeSolver = ") == 1
     assert repr(float(compiled(name).model.chain().stiffness[-1])) in text
-    assert text == compiled(name).js_source(gravity=True, points=4)
+    assert text == compiled(name).js_source(gravity=True, points=points)
     with pytest.raises(sr.ParameterError, match="points"):
         compiled(name).js_source(points=0)
 
