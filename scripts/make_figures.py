@@ -74,7 +74,9 @@ def link_laws() -> Any:
         "slack wall, membrane theory": slack.moment,
     }
     title = f"Moment of a link at {row.pressure / 1e3:g} kPa, k = {row.stiffness:g} N m/rad"
-    figure, axes = canvas.new_plot((8.0, 5.0), xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title)
+    figure, axes = canvas.new_plot(
+        (canvas.WIDTH, 4.8), xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title
+    )
     for number, (label, moments) in enumerate(laws.items()):
         style = canvas.line_style(number) | {"marker": None}
         axes.plot(angles, moments, lw=2.0, label=label, **style)
@@ -141,16 +143,16 @@ def finger_grip() -> Any:
     finger, way_to_close = _example("soft_finger.py")["SoftFinger"](), _example("three_fingers.py")["way_to_close"]
     model = sr.load_model(finger)
     pressures = np.linspace(0.0, finger.max_pressure, 17)
-    figure = canvas.new_figure((10.0, 4.4))
-    left, right = figure.subplots(1, 2)
+    figure = canvas.new_figure((canvas.WIDTH, 7.6))
+    upper, lower = figure.subplots(2, 1)
     free = [sr.solve_equilibrium(model, (p,)) for p in pressures]
     turned = [one.transform_tip_to_world.rotation for one in free]
     angles = np.degrees([np.arctan2(turn[0, 2], turn[2, 2]) for turn in turned])
     style = {"ls": "", "marker": canvas.MARKERS[0], "color": canvas.COLOURS[0]}
     closed_form = np.degrees([finger.closing_angle(p) for p in pressures])
-    left.plot(1e-3 * pressures, closed_form, color=canvas.COLOURS[1], label="p A d L / EI")
-    left.plot(1e-3 * pressures, angles, label="eight hinges", **style)
-    left.set(ylabel="closing angle [degrees]", title="Free finger")
+    upper.plot(1e-3 * pressures, closed_form, color=canvas.COLOURS[1], label="p A d L / EI")
+    upper.plot(1e-3 * pressures, angles, label="eight hinges", **style)
+    upper.set(ylabel="closing angle [degrees]", title="Free finger")
     for number, radius in enumerate((0.010, 0.015, 0.020)):
         points = []
         for pressure, open_finger in zip(pressures, free, strict=True):
@@ -158,9 +160,9 @@ def finger_grip() -> Any:
             if way >= 0.0:
                 held = sr.solve_imposed_displacement(model, (pressure,), way, direction=PUSH)
                 points.append((1e-3 * pressure, held.reaction))
-        right.plot(*np.transpose(points), label=f"cylinder of {2e3 * radius:g} mm", **canvas.line_style(number))
-    right.set(ylabel="force of a finger on the cylinder [N]", title="Grip of a hand of three fingers")
-    for axes in (left, right):
+        lower.plot(*np.transpose(points), label=f"cylinder of {2e3 * radius:g} mm", **canvas.line_style(number))
+    lower.set(ylabel="force of a finger on the cylinder [N]", title="Grip of a hand of three fingers")
+    for axes in (upper, lower):
         axes.set_xlabel("gauge pressure [kPa]")
         axes.set_xlim(0.0, None)
         axes.grid(alpha=0.3)

@@ -5,7 +5,9 @@ The oracle is the published simulation of [Machado 2009] at full severity, and C
 
 from __future__ import annotations
 
+import re
 from itertools import combinations, pairwise
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -124,7 +126,7 @@ def test_lines_that_look_alike_in_grey_differ_in_style_and_marker() -> None:
     for one, other in alike:
         assert one["ls"] != other["ls"]
         assert one["marker"] != other["marker"]
-    assert canvas.line_style(len(canvas.COLOURS)) == styles[0]
+    assert canvas.line_style(len(canvas.COLOURS)) == styles[0] | {"mfc": "white"}
 
 
 def test_lines_are_drawn_in_these_styles() -> None:
@@ -134,3 +136,17 @@ def test_lines_are_drawn_in_these_styles() -> None:
     drawn = {(line.get_color(), str(line.get_linestyle()), line.get_marker()) for line in figure.axes[0].lines}
     assert len(drawn) == 6
     assert len({marker for _, _, marker in drawn}) == 6
+
+
+def test_no_figure_of_the_package_is_wider_or_has_smaller_print_than_can_be_read() -> None:
+    """Nine points in a figure of seven inches are seven pixels where it is shown 400 pixels wide."""
+    assert canvas.SMALL * 400.0 / (72.0 * canvas.WIDTH) >= 7.0
+    names = {"SMALL": canvas.SMALL, "WIDTH": canvas.WIDTH}
+    for file in sorted(Path(canvas.__file__).parent.glob("*.py")):
+        if file.name == "helix_sheet.py":  # a sheet to scale, which is printed
+            continue
+        text = file.read_text(encoding="utf-8")
+        for size in re.findall(r"fontsize=([\w.]+)", text):
+            assert (names[size] if size in names else float(size)) >= canvas.SMALL, file.name
+        for width in re.findall(r"new_(?:figure|plot|space)\(\((\d[\d.]*),", text):
+            assert float(width) <= canvas.WIDTH, file.name

@@ -17,6 +17,7 @@ from softrobots import inflated_beam
 from softrobots.inflated_beam import TABLE_3, CharacterisationRow
 from softrobots.view.figures import equilibria, inflated_link
 from tests.conftest import CHECKOUT
+from tests.support.figures import READABLE, smallest_text
 from tests.support.tables import each_row
 
 pytestmark = pytest.mark.study
@@ -35,7 +36,8 @@ def lines(axes: Any) -> dict[str, np.ndarray]:
 
 
 def check_axes(figure: Any) -> None:
-    """Every axis has a unit, every plot a legend, and lines differ in more than colour."""
+    """Every axis has a unit, every plot a legend, lines differ in more than colour, and the smallest print is readable."""
+    assert smallest_text(figure) >= READABLE
     for axes in figure.axes:
         assert "[" in axes.get_xlabel()
         assert "[" in axes.get_ylabel()
@@ -173,7 +175,15 @@ def test_the_script_makes_what_is_asked_for(tmp_path: Path, capsys: pytest.Captu
     names = {*script["FIGURES"], *script["SCENES"]}
     guides = "".join(
         (CHECKOUT / "docs" / page).read_text(encoding="utf-8")
-        for page in ("actuators.md", "contact.md", "inflatable_arm.md", "own_robot.md", "motion.md", "your_robot.md")
+        for page in (
+            "actuators.md",
+            "contact.md",
+            "inflatable_arm.md",
+            "own_robot.md",
+            "motion.md",
+            "your_robot.md",
+            "watch.md",
+        )
     )
     for name in names:
         assert f"images/{name}.png" in guides

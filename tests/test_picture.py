@@ -17,6 +17,7 @@ from softrobots.statics.kinematics import backbone
 from softrobots.view.figures import canvas
 from softrobots.view.mesh_triangles import triangles
 from softrobots.view.robot_shapes import RobotShapes
+from tests.support.figures import READABLE, smallest_text
 from tests.support.laws import law
 
 ARM = sr.load_model(sr.InflatableArm())
@@ -95,13 +96,8 @@ def test_any_robot_is_drawn_with_its_body_and_actuators(name: str) -> None:
 
 
 def test_a_picture_is_readable_at_400_pixels_and_shown_by_notebooks() -> None:
-    """Seven pixels are the height at which small print can still be read on a screen."""
-    from matplotlib.text import Text
-
     figure = sr.plot(sr.solve_equilibrium(ARM, (0.3, 0.6, -0.8), (0, 10, -15)))
-    pixels = 400.0 / (figure.get_size_inches()[0] * 72.0)
-    sizes = [text.get_size() for text in figure.findobj(Text) if text.get_text()]
-    assert min(sizes) * pixels >= 7.0
+    assert smallest_text(figure) >= READABLE
     assert figure._repr_png_().startswith(b"\x89PNG")
     for axis in (figure.axes[0].xaxis, figure.axes[0].yaxis, figure.axes[0].zaxis):  # nothing is cut off at the edge
         box = axis.get_tightbbox(figure._get_renderer())

@@ -362,7 +362,7 @@ def test_another_version_of_softrobots_is_refused(arm: sr.SoftModel, monkeypatch
 def test_the_picture_shows_the_map(weighed: WorkspaceMap, tool: Callable[[str], ModuleType]) -> None:
     tool("matplotlib")
     figure = workspaces.workspace_maps(weighed, load=17.0)
-    reach, payload, pressure, *bars = figure.axes
+    reach, payload, pressure, _, *bars = figure.axes
     assert "16 N" in reach.get_title()
     shown = reach.collections[0].get_array().reshape(4, 5).T
     assert shown.tolist() == workspaces.outcome(weighed, 2)[:, 0].tolist()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from typing import Any
 
@@ -17,18 +16,14 @@ STYLES = (*CHAINS, IN_THE_MIDDLE, AT_THE_START)
 
 def figure(results: Mapping[str, dict[str, Any]]) -> Any:
     """Draw the errors over the number of segments, a panel a study, with the slopes of orders one and two."""
-    width = min(len(results), 3)
-    drawn = canvas.new_figure((4.4 * width, 4.3 * math.ceil(len(results) / width)))
-    grid = drawn.subplots(math.ceil(len(results) / width), width, squeeze=False).ravel()
+    drawn, grid = canvas.new_panels(len(results), 0.5 * canvas.WIDTH, 3.3, 0.9)
     for axes, result in zip(grid, results.values(), strict=False):
         panel(axes, result)
-    for axes in grid[len(results) :]:
-        axes.set_axis_off()
     entries: dict[str, Any] = {}
     for axes in grid[: len(results)]:
         handles, labels = axes.get_legend_handles_labels()
         entries = dict(zip(labels, handles, strict=True)) | entries
-    drawn.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=min(4, 2 * width), fontsize=9)
+    drawn.legend(entries.values(), entries.keys(), loc="outside lower center", ncols=2, fontsize=canvas.SMALL)
     return drawn
 
 
@@ -49,5 +44,5 @@ def panel(axes: Any, result: dict[str, Any]) -> None:
     axes.minorticks_off()
     axes.grid(alpha=0.3)
     head, _, rest = result["title"].partition(", ")
-    axes.set_title(f"{head}\n{rest.partition(';')[0]}", fontsize=9)
+    axes.set_title(f"{head}\n{rest.partition(';')[0]}", fontsize=canvas.SMALL)
     axes.set(xlabel="segments n [-]", ylabel="tip error [mm]")

@@ -31,7 +31,7 @@ def picture(results: Results, name: str) -> Any:
         MissingDependency: If matplotlib is not installed.
     """
     title, size, cost = PICTURES[name]
-    figure = canvas.new_figure((8.0, 5.2))
+    figure = canvas.new_figure((canvas.WIDTH, 5.6))
     axes = figure.add_subplot()
     curves = [curve for curve in results.curves if curve.picture == name]
     for number, curve in enumerate(curves):
@@ -48,5 +48,5 @@ def picture(results: Results, name: str) -> Any:
     axes.set(xlabel=size, ylabel=cost, title=title)
     axes.grid(alpha=0.3, which="both")
     if curves:
-        axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+        figure.legend(fontsize=canvas.SMALL, loc="outside lower center", ncols=2)
     return figure

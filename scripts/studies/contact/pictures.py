@@ -18,7 +18,7 @@ FRICTION = 0.5
 def margins(weights: FloatArray, leaning: sr.ContactPath) -> Any:
     """Share of the wrinkling moment that is left in each link over the weight, with the wall and without."""
     texts = {"xlabel": "weight on the tip [N]", "ylabel": "share of the wrinkling moment left [-]"}
-    figure, axes = canvas.new_plot((8.0, 4.6), title="What the links have left", **texts)
+    figure, axes = canvas.new_plot((canvas.WIDTH, 4.4), title="What the links have left", **texts)
     states = {"free": examples.free_arm(weights), "on the wall": leaning.equilibria}
     number = 0
     for name, shown in states.items():
@@ -36,7 +36,7 @@ def margins(weights: FloatArray, leaning: sr.ContactPath) -> Any:
 def grip_forces(path: sr.ContactPath) -> Any:
     """Sum of the normal forces of a helix on a rod over its depth, and the pull along the axis that friction holds."""
     texts = {"xlabel": "depth of the rod [m]", "ylabel": "force [N]", "title": "Grip of the helix"}
-    figure, axes = canvas.new_plot((8.0, 4.6), **texts)
+    figure, axes = canvas.new_plot((canvas.WIDTH, 4.4), **texts)
     every = max(len(path.parameters) // 10, 1)
     squeeze = [sum(contact.normal_force for contact in state) for state in path.contacts]
     axes.plot(path.parameters, squeeze, label="sum of the normal forces", **canvas.line_style(0) | {"markevery": every})

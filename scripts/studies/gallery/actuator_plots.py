@@ -27,7 +27,7 @@ def actuator_kinds() -> Any:
         "mckibben": "mckibben: 100 kPa, 10 mm, braid at 25 degrees",
     }
     texts = {"xlabel": "length of the actuator [m]", "ylabel": "tension [N]", "title": "What an actuator of 0.2 m exerts"}
-    figure, axes = canvas.new_plot((8.0, 5.0), **texts)
+    figure, axes = canvas.new_plot((canvas.WIDTH, 4.8), **texts)
     for number, (kind, given) in enumerate(inputs.items()):
         law = ActuatorLaws([ActuatorTag(name=kind, route=(), kind=kind, rest_length=LENGTH, **sizes)])
         tensions = [float(law.at(np.array([share * LENGTH]), np.array([given])).tension[0]) for share in shares]
@@ -45,7 +45,7 @@ def dry_friction() -> Any:
     """Tip of an arm over the pull of a tendon that goes there and back, without and with friction."""
     tensions = np.concatenate([np.linspace(0.0, 6.0, 31), np.linspace(5.8, 1.0, 25), np.linspace(1.2, 6.0, 25)])
     texts = {"xlabel": "tension of the tendon [N]", "ylabel": "tip aside [mm]", "title": "A tendon pulled and let go twice"}
-    figure, axes = canvas.new_plot((8.0, 5.0), **texts)
+    figure, axes = canvas.new_plot((canvas.WIDTH, 4.8), **texts)
     words: dict[str, dict[str, Any]] = {
         "no friction": {},
         "friction of bending: 2 N mm": {"bending_friction": 2e-3},

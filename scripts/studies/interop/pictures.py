@@ -15,10 +15,10 @@ SMALLEST = 1e-18
 
 def figure(results: Results) -> Any:
     """Draw every difference against its tolerance."""
-    figure = canvas.new_figure((11.0, 5.6))
-    left, right = figure.subplots(1, 2, width_ratios=(1.35, 1.0))
-    _draw_equilibria(left, results["equilibrium"])
-    _draw_kinematics(right, results["kinematics"])
+    figure = canvas.new_figure((canvas.WIDTH, 9.0))
+    upper, lower = figure.subplots(2, 1, height_ratios=(1.2, 1.0))
+    _draw_equilibria(upper, results["equilibrium"])
+    _draw_kinematics(lower, results["kinematics"])
     return figure
 
 
@@ -65,4 +65,4 @@ def _finish(axes: Any, labels: Sequence[str], quantity: str) -> None:
     axes.set_ylim(len(labels) - 0.4, -0.6)
     axes.set_xlabel(f"{quantity}; 0 is drawn at {SMALLEST:.0e}")
     axes.grid(alpha=0.3, axis="x")
-    axes.legend(fontsize=8, loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=3)
+    axes.legend(fontsize=canvas.SMALL)

@@ -41,8 +41,9 @@ def plain_words(name: str) -> str:
 
 
 def line_style(number: int) -> dict[str, Any]:
-    """Return matplotlib's colour, style and marker of a line, numbered from 0; they repeat after six lines."""
-    return {
+    """Return matplotlib's colour, style and marker of a line, numbered from 0; from the seventh on markers are hollow."""
+    hollow = {"mfc": "white"} if number >= len(COLOURS) else {}
+    return hollow | {
         "color": COLOURS[number % len(COLOURS)],
         "ls": LINES[number % len(LINES)],
         "marker": MARKERS[number % len(MARKERS)],
@@ -99,8 +100,8 @@ def new_plot(size: tuple[float, float], **texts: str) -> tuple[Any, Any]:
 
 
 def new_panels(count: int, width: float, height: float, margin: float) -> tuple[Any, Any]:
-    """Return a figure of panels of a size in inches, at most three abreast, with a margin, and their axes; one at least."""
-    across = min(max(count, 1), 3)
+    """Return a figure of panels of a size in inches, as many abreast as fit, with a margin, and their axes; one at least."""
+    across = min(max(count, 1), int(WIDTH / width))
     down = -(-max(count, 1) // across)
     figure = new_figure((max(width * across, 4.0), margin + height * down))
     panels = figure.subplots(down, across, squeeze=False).ravel()
@@ -118,7 +119,7 @@ def new_space(size: tuple[float, float], title: str) -> tuple[Any, Any]:
 def grid_and_legend(axes: Any, **style: Any) -> None:
     """Draw a grid and a legend in small print; `style` is matplotlib's of a legend."""
     axes.grid(alpha=0.3)
-    axes.legend(**{"fontsize": 9, **style})
+    axes.legend(**{"fontsize": SMALL, **style})
 
 
 def equal_box(axes: Any, points: FloatArray, eye: Any = (0.44, -0.82, 0.38)) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 
 from softrobots.core.checks import instance_of
 from softrobots.statics.contact.contact_path import ContactPath
-from softrobots.view.figures.canvas import line_style, new_plot, plain_words
+from softrobots.view.figures.canvas import WIDTH, line_style, new_plot, plain_words
 
 
 def contact_forces(path: ContactPath, *, parameter: str = "parameter [-]") -> Any:
@@ -27,7 +27,7 @@ def contact_forces(path: ContactPath, *, parameter: str = "parameter [-]") -> An
     """
     instance_of("path", path, ContactPath, "a ContactPath")
     texts = {"xlabel": parameter, "ylabel": "force on the robot [N]", "title": "Forces of obstacles"}
-    figure, axes = new_plot((8.0, 4.6), **texts)
+    figure, axes = new_plot((WIDTH, 4.4), **texts)
     names = dict.fromkeys(contact.obstacle for state in path.contacts for contact in state)
     for number, name in enumerate(names):
         forces = [sum(float(np.linalg.norm(one.force)) for one in state if one.obstacle == name) for state in path.contacts]

@@ -12,7 +12,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.imposed_displacement import ImposedDisplacement
-from softrobots.view.figures.canvas import grid_and_legend, line_style, new_figure, new_plot
+from softrobots.view.figures.canvas import SMALL, WIDTH, grid_and_legend, line_style, new_figure, new_plot
 
 
 def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, *, critical: float | None = None) -> Any:
@@ -32,24 +32,24 @@ def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, 
     """
     unit = unit_vector("direction", direction)
     _check(branches, Equilibrium)
-    figure = new_figure((10.0, 4.4))
-    left, right = figure.subplots(1, 2)
+    figure = new_figure((WIDTH, 7.6))
+    upper, lower = figure.subplots(2, 1)
     for number, (label, branch) in enumerate(branches.items()):
         if branch[0].model.n_springs == 0:
             raise ParameterError("branches", branch[0].model, "of a robot with springs")
         forces = [_force(equilibrium) @ unit for equilibrium in branch]
         ways = [1e3 * float(np.linalg.norm(one.tip_position - branch[0].tip_position)) for one in branch]
         style = {"label": label, "markevery": max(len(branch) // 10, 1)} | line_style(number)
-        left.plot(forces, ways, **style)
-        right.plot(forces, [one.eigenvalues[0] for one in branch], **style)
-    for axes in (left, right):
+        upper.plot(forces, ways, **style)
+        lower.plot(forces, [one.eigenvalues[0] for one in branch], **style)
+    for axes in (upper, lower):
         if critical is not None:
             force = positive_number("critical", critical, "N")
             axes.axvline(force, color="black", lw=1.0, label=f"buckling load, {force:.2f} N")
         axes.set_xlabel("force at the tip [N]")
         grid_and_legend(axes)
-    left.set(ylabel="way of the tip [mm]", title="Where the tip goes")
-    right.set(ylabel="smallest eigenvalue of the tangent stiffness [N m/rad]", title="What stiffness is left")
+    upper.set(ylabel="way of the tip [mm]", title="Where the tip goes")
+    lower.set(ylabel="smallest eigenvalue [N m/rad]", title="What is left of the tangent stiffness")
     return figure
 
 
@@ -71,21 +71,22 @@ def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
     if not isinstance(found, Sequence) or not found or not all(isinstance(one, EquilibriumBranch) for one in found):
         raise ParameterError("found", found, "at least one EquilibriumBranch")
     origin = found[0].equilibria[0].tip_position
-    figure = new_figure((10.0, 4.8))
-    left, right = figure.subplots(1, 2)
+    figure = new_figure((WIDTH, 8.2))
+    upper, lower = figure.subplots(2, 1)
     for number, branch in enumerate(found):
         ways = [1e3 * float(unit @ (one.tip_position - origin)) for one in branch.equilibria]
         style = line_style(number) | {"ls": "-", "ms": 4, "markevery": max(len(ways) // 5, 1)}
         dashed = ~branch.stable
         dashed[:-1] |= dashed[1:]  # up to the end of the solid line
-        for axes, values in ((left, ways), (right, branch.softest)):
+        for axes, values in ((upper, ways), (lower, branch.softest)):
             axes.plot(branch.forces, np.where(branch.stable, values, np.nan), label=branch.label, **style)
             axes.plot(branch.forces, np.where(dashed, values, np.nan), **(style | {"ls": "--", "marker": ""}))
-    for axes in (left, right):
+    for axes in (upper, lower):
         axes.set_xlabel("force [N]")
-        grid_and_legend(axes, fontsize=7)
-    left.set(ylabel="way of the tip across the push [mm]", title="Where the tip goes (dashed: not stable)")
-    right.set(ylabel="softest eigenvalue over the springs' stiffness [-]", title="How stable it is")
+        axes.grid(alpha=0.3)
+    figure.legend(*upper.get_legend_handles_labels(), fontsize=SMALL, loc="outside lower center", ncols=2)
+    upper.set(ylabel="way of the tip across the push [mm]", title="Where the tip goes (dashed: not stable)")
+    lower.set(ylabel="softest eigenvalue over stiffness [-]", title="How stable it is")
     return figure
 
 
@@ -106,7 +107,7 @@ def reaction(runs: Mapping[str, Sequence[ImposedDisplacement]]) -> Any:
     """
     _check(runs, ImposedDisplacement)
     labels = {"xlabel": "displacement of the probe [mm]", "ylabel": "force on the robot [N]"}
-    figure, axes = new_plot((8.0, 4.6), title="Imposed displacement", **labels)
+    figure, axes = new_plot((WIDTH, 4.4), title="Imposed displacement", **labels)
     for number, (label, run) in enumerate(runs.items()):
         ways = 1e3 * np.array([state.displacement for state in run])
         forces = np.array([state.reaction for state in run])

@@ -9,7 +9,7 @@ import numpy as np
 from softrobots.core.checks import instance_of
 from softrobots.identification.cross_validation import CrossValidation
 from softrobots.identification.informative_poses import InformativePoses
-from softrobots.view.figures.canvas import COLOURS, line_style, new_plot, plain_words
+from softrobots.view.figures.canvas import COLOURS, WIDTH, line_style, new_plot, plain_words
 
 
 def cross_validation(result: CrossValidation) -> Any:
@@ -24,7 +24,7 @@ def cross_validation(result: CrossValidation) -> Any:
     """
     instance_of("result", result, CrossValidation, "a CrossValidation")
     scale, unit = (1e3, "mm") if result.unit == "m" else (1.0, result.unit)
-    figure, axes = new_plot((7.2, 1.7 + 0.55 * len(result.sets)), xlabel=f"error on the family left out [{unit}]")
+    figure, axes = new_plot((WIDTH, 1.7 + 0.55 * len(result.sets)), xlabel=f"error on the family left out [{unit}]")
     for place, (name, means, spread, errors) in enumerate(
         zip(result.sets, scale * result.means, scale * result.standard_errors, scale * result.errors, strict=True)
     ):
@@ -54,7 +54,7 @@ def informative(result: InformativePoses) -> Any:
     """
     instance_of("result", result, InformativePoses, "InformativePoses")
     label = "width of the interval, relative to that with the chosen poses [-]"
-    figure, axes = new_plot((7.2, 1.7 + 0.36 * len(result.names)), xlabel=label, xscale="log")
+    figure, axes = new_plot((WIDTH, 1.7 + 0.36 * len(result.names)), xlabel=label, xscale="log")
     for number, (name, widths) in enumerate(result.margins.items()):
         label = f"{name} ({len(result.indices)})" if name == "chosen" else name
         style = line_style(number) | {"ls": "", "ms": 7}

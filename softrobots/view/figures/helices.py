@@ -13,7 +13,7 @@ import numpy as np
 from softrobots import helix
 from softrobots.core.checks import FloatArray, finite_array, instance_of, positive_number
 from softrobots.core.errors import ParameterError
-from softrobots.view.figures.canvas import COLOURS, MARKERS, grid_and_legend, new_figure
+from softrobots.view.figures.canvas import COLOURS, MARKERS, SMALL, WIDTH, grid_and_legend, new_figure
 from softrobots.view.figures.helix_sheet import draw, sheet
 
 MOST_HELICES = 60
@@ -76,8 +76,8 @@ def radius_and_pitch(angles: Any, diameter: float) -> Any:
     tilts, size = _row("angles", angles, "rad"), positive_number("diameter", diameter, "m")
     if len(tilts) > len(_STYLES) or np.any(tilts <= 0.0) or np.any(tilts > 0.25 * np.pi):
         raise ParameterError("angles", angles, f"up to {len(_STYLES)} angles above 0 and at most pi/4 rad")
-    figure = new_figure((14.0, 5.2))
-    radius, pitch, close = figure.subplots(1, 3)
+    figure = new_figure((WIDTH, 8.6))
+    radius, pitch, close = figure.subplot_mosaic([["radius", "pitch"], ["close", "close"]]).values()
     below = 100 * size / (2.0 * np.pi)
     for axes in (pitch, close):
         axes.axhline(below, color="0.35", lw=1.0)
@@ -90,7 +90,7 @@ def radius_and_pitch(angles: Any, diameter: float) -> Any:
         (close, "$b$ [cm/rad]", "Pitch near self-contact"),
     ):
         axes.set(xlabel=r"contraction $\lambda$ [-]", ylabel=name, xlim=(0.0, 1.0))
-        axes.set_title(title, fontsize=11)
+        axes.set_title(title)
         axes.set_ylim(bottom=0.0)
         axes.grid(alpha=0.3)
     close.set(xlim=(max(0.0, limits.min() - 0.1), min(1.0, limits.max() + 0.1)), ylim=(0.0, 3.0 * below))
@@ -123,33 +123,37 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
     most_deflected = min(0.5 * test.diameter - test.gap / np.pi, test.object_radius)
     deepest = min(most_deflected, max(1.5 * float(depths.max()), 0.1 * test.diameter))
     pressures, range_of = np.linspace(0.0, most, 9), np.linspace(0.0, deepest, 300)
-    figure = new_figure((11.5, 5.4))
-    left, right = figure.subplots(1, 2, sharey=True)
+    figure = new_figure((WIDTH, 8.2))
+    upper, lower = figure.subplots(2, 1, sharey=True)
     for number, depth in enumerate(depths):
         bounds, colour = test.force(pressures, depth), COLOURS[number]
         style = {"color": colour, "marker": MARKERS[number], "ms": 7, "clip_on": False}
-        left.plot(pressures / 1e3, bounds.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
+        upper.plot(pressures / 1e3, bounds.contact, ls=_THIN_STYLE, lw=1.6, mfc="white", markevery=(2 + number, 3), **style)
         label = f"force, deflected by {1e3 * depth:.3g} mm"
         wide = 4.5 if number == 1 else 2.2  # lines may lie upon each other, and all but the first on their bound
-        left.plot(
+        upper.plot(
             pressures / 1e3, bounds.force, lw=wide, ls=_STYLES[number // 2 % 3], markevery=(number, 3), label=label, **style
         )
-        right.plot([1e3 * depth], [bounds.force[-1]], ls="none", zorder=4, **style)
+        lower.plot([1e3 * depth], [bounds.force[-1]], ls="none", zorder=4, **style)
     bounds = test.force(most, range_of)
-    right.plot(1e3 * range_of, bounds.force, color="0.75", lw=6.0, label="force, the smaller bound", zorder=1)
-    right.plot(1e3 * range_of, bounds.unwrapping, color="black", lw=1.2, label="bound (a): the tube unwraps")
-    right.plot(1e3 * range_of, bounds.contact, color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b): the wall flattens")
+    lower.plot(1e3 * range_of, bounds.force, color="0.75", lw=6.0, label="force, the smaller bound", zorder=1)
+    lower.plot(1e3 * range_of, bounds.unwrapping, color="black", lw=1.2, label="bound (a): the tube unwraps")
+    lower.plot(1e3 * range_of, bounds.contact, color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b): the wall flattens")
     undeflected = test.force(pressures, 0.0)
-    left.plot(pressures / 1e3, undeflected.unwrapping, color="black", lw=6.5, zorder=1, label="bound (a): the tube unwraps")
-    left.plot([], [], color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b), open marks: the wall flattens")
-    left.set(xlabel="gauge pressure [kPa]", ylabel="grasp force [N]", xlim=(0.0, most / 1e3))
-    right.set(xlabel=f"deflection of the inner radius at {most / 1e3:.3g} kPa [mm]", xlim=(0.0, 1e3 * deepest))
-    for axes in (left, right):
+    upper.plot(pressures / 1e3, undeflected.unwrapping, color="black", lw=6.5, zorder=1, label="bound (a): the tube unwraps")
+    upper.plot([], [], color="black", lw=1.2, ls=_THIN_STYLE, label="bound (b), open marks: the wall flattens")
+    upper.set(xlabel="gauge pressure [kPa]", ylabel="grasp force [N]", xlim=(0.0, most / 1e3))
+    lower.set(
+        xlabel=f"deflection of the inner radius at {most / 1e3:.3g} kPa [mm]",
+        ylabel="grasp force [N]",
+        xlim=(0.0, 1e3 * deepest),
+    )
+    for axes in (upper, lower):
         axes.set_ylim(bottom=0.0)
-        grid_and_legend(axes, loc="upper left" if axes is left else "lower right")
+        grid_and_legend(axes, loc="upper left" if axes is upper else "lower right")
     halves = f" in halves {1e3 * test.gap:.3g} mm apart" if test.gap else ""
     case = f"object {200 * test.object_radius:.3g} cm thick{halves}, tube {100 * test.diameter:.3g} cm, {test.turns:.3g} turns"
-    figure.suptitle(f"Grasp force: our model, not data of the paper ({case}, {100 * test.turn_height:.3g} cm rise per turn)")
+    figure.suptitle(f"Grasp force: our model, not data of the paper\n({case}, {100 * test.turn_height:.3g} cm rise per turn)")
     return figure
 
 
@@ -188,7 +192,7 @@ def _name_lines(figure: Any, axes: Any) -> None:
     }
     black: dict[str, Any] = {"color": "black"}
     lines = [Line2D([], [], **(black | style)) for style in styles.values()]
-    figure.legend(angles + lines, names + list(styles), loc="outside lower center", ncols=3, fontsize=9)
+    figure.legend(angles + lines, names + list(styles), loc="outside lower center", fontsize=SMALL)
 
 
 def _row(name: str, values: Any, unit: str) -> FloatArray:

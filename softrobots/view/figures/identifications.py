@@ -13,11 +13,22 @@ import numpy as np
 from softrobots.core.checks import FloatArray, instance_of
 from softrobots.identification.identification import UNITS, Comparison, Identification
 from softrobots.identification.uncertainty import CONFIDENCE, Uncertainty
-from softrobots.view.figures.canvas import COLOURS, MARKERS, grid_and_legend, new_figure, new_panels, new_plot, plain_words
+from softrobots.view.figures.canvas import (
+    COLOURS,
+    MARKERS,
+    SMALL,
+    WIDTH,
+    grid_and_legend,
+    new_figure,
+    new_panels,
+    new_plot,
+    plain_words,
+)
 
 _MOST_PANELS = 12  # panels of predicted against measured
 _MOST_PAIRS = 6  # confidence ellipses
 _MOST_NAMED = 5  # outliers
+_MOST_BESIDE = 30  # names of parameters beside a matrix
 _MOST_WRITTEN = 14  # parameters up to which correlations are written into their cells
 _SMALL = {"m": (1e3, "mm"), "rad": (1e3, "mrad")}  # units of residuals
 
@@ -59,7 +70,7 @@ def residuals(result: Identification) -> Any:
     instance_of("result", result, Identification, "an Identification")
     rows = result.fitted.measurements
     parts = [(key, part) for key in rows.measured for part in _parts(result.fitted, key)]
-    figure = new_figure((7.2, 1.2 + 2.4 * len(parts)))
+    figure = new_figure((WIDTH, 1.2 + 2.4 * len(parts)))
     panels = figure.subplots(len(parts), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (key, part) in zip(panels, parts, strict=True):
         scale, unit = _SMALL.get(part.unit, (1.0, part.unit))
@@ -105,7 +116,7 @@ def predicted(result: Identification) -> Any:
         if part.unit != "rad"
         for number in range(len(part.axes))
     ][:_MOST_PANELS]
-    figure, grid = new_panels(len(panels), 2.7, 2.7, 0.7)
+    figure, grid = new_panels(len(panels), 2.33, 2.5, 0.7)
     for axes, (key, part, number) in zip(grid, panels, strict=False):
         shown = [_numbers(one, key)[:, :, number] for one in (result.fitted, result.validation) if one is not None]
         every = np.concatenate(shown, axis=None)
@@ -138,7 +149,7 @@ def values(result: Identification) -> Any:
     """
     instance_of("result", result, Identification, "an Identification")
     intervals, blocks = result.intervals, result.block_intervals
-    figure, axes = new_plot((8.4, 1.5 + 0.42 * len(result.parameters)), title="Parameters before and after the fit")
+    figure, axes = new_plot((WIDTH, 1.5 + 0.42 * len(result.parameters)), title="Parameters before and after the fit")
     axes.grid(visible=False)
     for place, (one, value) in enumerate(zip(result.parameters, result.solution.tolist(), strict=True)):
         ends = intervals[one.name]
@@ -158,7 +169,7 @@ def values(result: Identification) -> Any:
         axes.plot(at(one.value), place, ls="", marker="D", ms=7, mfc="white", color="0.35")
         axes.plot(at(value), place, ls="", marker="o", ms=7, color=COLOURS[0])
         words = f"{ends[0]:.4g} .. {ends[1]:.4g}" if np.isfinite(ends).all() else "not determined"
-        axes.text(1.09, place, f"{value:.4g} ({words}) {one.unit}", va="center", fontsize=10)
+        axes.text(1.09, place, f"{value:.4g} ({words}) {one.unit}", va="center", fontsize=SMALL)
     handles = [
         axes.plot([], [], ls="", marker="D", ms=7, mfc="white", color="0.35", label="start")[0],
         axes.plot([], [], ls="", marker="o", ms=7, color=COLOURS[0], label="fitted")[0],
@@ -186,18 +197,20 @@ def correlation(result: Identification) -> Any:
     instance_of("result", result, Identification, "an Identification")
     kept = np.flatnonzero(result.by_rows.determined)
     found = result.by_rows.correlation[np.ix_(kept, kept)]
-    size = min(2.8 + 0.42 * len(kept), 12.0)
+    size = min(2.8 + 0.42 * len(kept), WIDTH - 0.9)
     figure = new_figure((size + 0.9, size))
     axes = figure.add_subplot(title="Correlation of the errors")
     image = axes.imshow(found, cmap="PuOr", vmin=-1.0, vmax=1.0)
     names = [plain_words(result.names[number]) for number in kept]
-    print_size = 10 if len(kept) <= _MOST_WRITTEN else 7
-    axes.set_xticks(range(len(kept)), names, rotation=90, fontsize=print_size)
-    axes.set_yticks(range(len(kept)), names, fontsize=print_size)
+    every = -(-len(kept) // _MOST_BESIDE)  # names of more would lie upon each other
+    axes.set_xticks(range(0, len(kept), every), names[::every], rotation=90, fontsize=SMALL)
+    axes.set_yticks(range(0, len(kept), every), names[::every], fontsize=SMALL)
     if len(kept) <= _MOST_WRITTEN:
         for (row, column), number in np.ndenumerate(found):
             text = f"{number:.1f}".replace("-0.0", "0.0")
-            axes.text(column, row, text, ha="center", va="center", fontsize=8, color="white" if abs(number) > 0.7 else "0.1")
+            axes.text(
+                column, row, text, ha="center", va="center", fontsize=SMALL, color="white" if abs(number) > 0.7 else "0.1"
+            )
     figure.colorbar(image, ax=axes, shrink=0.7)
     return figure
 

@@ -14,7 +14,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.inflated_beam import BendingData, Characterisation, CharacterisationRow
 from softrobots.inflated_beam.characterisation_fit import CONFIDENCE
 from softrobots.inflated_beam.fitted_line import FittedLine, student_quantile
-from softrobots.view.figures.canvas import COLOURS, LINES, MARKERS, grid_and_legend, line_style, new_figure, new_plot
+from softrobots.view.figures.canvas import COLOURS, LINES, MARKERS, WIDTH, grid_and_legend, line_style, new_figure, new_plot
 
 _FAINT = "#7f7f7f"
 
@@ -66,7 +66,7 @@ def deflection(
     printed = beam + curvature * x**3 / 3.0
     rigid = force * (length - offset) / stiffness * np.maximum(x - offset, 0.0)
     title = f"An inflated link under {force:g} N at its end, {pressure / 1e3:g} kPa"
-    figure, axes = new_plot((8.0, 4.6), xlabel="distance from the clamp [mm]", ylabel="deflection [mm]", title=title)
+    figure, axes = new_plot((WIDTH, 4.4), xlabel="distance from the clamp [mm]", ylabel="deflection [mm]", title=title)
     lines = (
         (beam, "beam (1), sign corrected"),
         (bending, "the same without shear"),
@@ -98,7 +98,7 @@ def moment_angle_laws(rows: Sequence[CharacterisationRow], radius: float) -> Any
     tops = [limit if row.max_moment is None else row.max_moment for row, limit in zip(rows, limits, strict=True)]
     last = 1.25 * max(top / row.stiffness for row, top in zip(rows, tops, strict=True))
     title = "Moment-angle law of a link by gauge pressure"
-    figure, axes = new_plot((8.0, 5.2), xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title)
+    figure, axes = new_plot((WIDTH, 5.0), xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title)
     for number, (row, limit, top) in enumerate(zip(rows, limits, tops, strict=True)):
         angles = np.linspace(0.0, last if row.max_moment is not None else limit / row.stiffness, 101)
         moments = inflated_beam.moment(angles, stiffness=row.stiffness, max_moment=top)
@@ -137,7 +137,7 @@ def characterisation(data: BendingData, fit: Characterisation, *, pressure: floa
     """
     limits = inflated_beam.moment_limits(pressure, radius)
     title = f"Bending test of a link at {pressure / 1e3:g} kPa"
-    figure, axes = new_plot((8.0, 5.2), xlabel="measured hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title)
+    figure, axes = new_plot((WIDTH, 5.0), xlabel="measured hinge angle [rad]", ylabel="moment at the hinge [N m]", title=title)
     sides = np.where(data.angle < fit.angle_offset, -1.0, 1.0)
     bent, moments = sides * (data.angle - fit.angle_offset), sides * data.moment
     knee = math.inf if fit.max_moment is None else fit.max_moment
@@ -201,22 +201,22 @@ def pressure_effects(
     tube = {"length": length, "radius": radius, "wall_thickness": wall_thickness, "poisson_ratio": poisson_ratio}
     stiffness = inflated_beam.stiffness_from_young_modulus(young_modulus, pressure=pressures, **tube)
     limits = inflated_beam.moment_limits(pressures, radius)
-    figure = new_figure((10.0, 4.4))
-    left, right = figure.subplots(1, 2)
+    figure = new_figure((WIDTH, 7.6))
+    upper, lower = figure.subplots(2, 1)
     measured = np.array([(row.pressure, row.stiffness, row.stiffness_std) for row in rows])
     style = {"ls": "", "marker": MARKERS[0], "color": COLOURS[0], "ms": 6}
-    left.errorbar(1e-3 * measured[:, 0], measured[:, 1], measured[:, 2], capsize=4, label="measured, +- one sigma", **style)
-    left.plot(1e-3 * pressures, stiffness, color=COLOURS[1], label=f"beam (1), E = {young_modulus / 1e6:.4g} MPa")
+    upper.errorbar(1e-3 * measured[:, 0], measured[:, 1], measured[:, 2], capsize=4, label="measured, +- one sigma", **style)
+    upper.plot(1e-3 * pressures, stiffness, color=COLOURS[1], label=f"beam (1), E = {young_modulus / 1e6:.4g} MPa")
     mean = float(measured[:, 1].mean())
-    left.axhline(mean, color=_FAINT, ls="--", lw=1.0, label=f"mean, {mean:.2f} N m/rad")
-    left.set(xlabel="gauge pressure [kPa]", ylabel="stiffness [N m/rad]", title="Stiffness hardly depends on pressure")
-    left.set_ylim(0.0, 1.08 * float((measured[:, 1] + measured[:, 2]).max()))
+    upper.axhline(mean, color=_FAINT, ls="--", lw=1.0, label=f"mean, {mean:.2f} N m/rad")
+    upper.set(xlabel="gauge pressure [kPa]", ylabel="stiffness [N m/rad]", title="Stiffness hardly depends on pressure")
+    upper.set_ylim(0.0, 1.08 * float((measured[:, 1] + measured[:, 2]).max()))
     plateaus = np.array([(row.pressure, row.max_moment) for row in rows if row.max_moment is not None]).reshape(-1, 2)
-    right.plot(1e-3 * pressures, limits.collapse, color=COLOURS[2], ls=LINES[1], label="upper bound, pi p r^3")
-    right.plot(1e-3 * plateaus[:, 0], plateaus[:, 1], label="largest moment, measured", **style)
-    right.plot(1e-3 * pressures, limits.wrinkling, color=COLOURS[1], label="wrinkling moment (3)")
-    right.set(xlabel="gauge pressure [kPa]", ylabel="moment [N m]", title="What a link can carry does")
-    for axes in (left, right):
+    lower.plot(1e-3 * pressures, limits.collapse, color=COLOURS[2], ls=LINES[1], label="upper bound, pi p r^3")
+    lower.plot(1e-3 * plateaus[:, 0], plateaus[:, 1], label="largest moment, measured", **style)
+    lower.plot(1e-3 * pressures, limits.wrinkling, color=COLOURS[1], label="wrinkling moment (3)")
+    lower.set(xlabel="gauge pressure [kPa]", ylabel="moment [N m]", title="What a link can carry does")
+    for axes in (upper, lower):
         axes.set_xlim(0.0, None)
         grid_and_legend(axes, loc="lower right")
     return figure

@@ -17,6 +17,7 @@ from softrobots.statics.trajectory import Trajectory
 from softrobots.view.figures.canvas import (
     COLOURS,
     MARKERS,
+    WIDTH,
     equal_box,
     force_arrow,
     line_style,
@@ -44,7 +45,7 @@ def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
     """
     positive_integer("shown", shown)
     instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
-    figure, axes = new_space((8.0, 6.4), "Loaded arm along the path")
+    figure, axes = new_space((WIDTH, 6.2), "Loaded arm along the path")
     model = trajectory.model
     chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, shown).round().astype(int))
     everything = [trajectory.tip_positions]
@@ -90,7 +91,7 @@ def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
     if len(rigid.times) != len(trajectory.times):
         raise ParameterError("rigid", len(rigid.times), f"a trajectory with {len(trajectory.times)} waypoints")
     figure, axes = new_plot(
-        (8.0, 5.0), xlabel="time [s]", ylabel="motor angle [rad]", title="Motor angles: elastic and rigid inverse kinematics"
+        (WIDTH, 5.0), xlabel="time [s]", ylabel="motor angle [rad]", title="Motor angles: elastic and rigid inverse kinematics"
     )
     every = max(len(trajectory.times) // 10, 1)
     for number, name in enumerate(trajectory.model.motor_joints):
@@ -119,7 +120,7 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray, *, angles: bool
     moments = finite_array("times", times, (None,), "s")
     lines = {label: finite_array(f"errors[{label!r}]", error, moments.shape) for label, error in errors.items()}
     title = f"{'Angle' if angles else 'Distance'} of the loaded tip from its target"
-    figure, axes = new_plot((8.0, 4.4), xlabel="time [s]", ylabel=f"tip error [{'mrad' if angles else 'mm'}]", title=title)
+    figure, axes = new_plot((WIDTH, 4.4), xlabel="time [s]", ylabel=f"tip error [{'mrad' if angles else 'mm'}]", title=title)
     every = max(len(moments) // 10, 1)
     for number, (label, error) in enumerate(lines.items()):
         axes.semilogy(moments, np.maximum(error, 1e-16) * 1e3, markevery=every, label=label, **line_style(number))
@@ -145,7 +146,7 @@ def link_moments(trajectory: Trajectory) -> Any:
     if moments is None:
         raise ParameterError("trajectory", trajectory.model, "of a robot with inflated links")
     title = "Moment at the springs of each link"
-    figure, axes = new_plot((8.0, 4.4), xlabel="time [s]", ylabel="moment [N m]", title=title)
+    figure, axes = new_plot((WIDTH, 4.4), xlabel="time [s]", ylabel="moment [N m]", title=title)
     every = max(len(trajectory.times) // 10, 1)
     for number, moment in enumerate(moments.T):
         axes.plot(trajectory.times, moment, markevery=every, label=f"link {number + 1}", **line_style(number))

@@ -10,7 +10,7 @@ from softrobots.core.checks import FloatArray, finite_number, instance_of
 from softrobots.core.errors import ParameterError
 from softrobots.statics.workspace import Workspace
 from softrobots.statics.workspace_map import WorkspaceMap
-from softrobots.view.figures.canvas import new_figure, plain_words
+from softrobots.view.figures.canvas import SMALL, WIDTH, new_figure, plain_words
 
 NOT_REACHED, LOST, WRINKLED, CARRIED = range(4)
 """Outcome of a target under a load: never reached, lost under the load, reached with a wrinkled link, carried."""
@@ -34,11 +34,12 @@ def workspace(samples: Workspace) -> Any:
         MissingDependency: If matplotlib is not installed.
     """
     instance_of("samples", samples, Workspace, "a Workspace")
-    figure = new_figure((13.0, 4.4))
+    figure = new_figure((WIDTH, 7.0))
     tips, order = samples.tip_positions, np.argsort(samples.manipulability)
     scale = {"c": samples.manipulability[order], "cmap": "cividis", "s": 7, "rasterized": True}
     scale |= {"linewidths": 0.2, "edgecolors": "0.35"}  # so that the lightest are visible on white
-    all_axes = figure.subplots(1, 3)
+    *all_axes, spare = figure.subplots(2, 2).ravel()
+    spare.remove()
     centre, half = 0.5 * (tips.max(0) + tips.min(0)), 0.55 * max(float(np.ptp(tips, axis=0).max()), 1e-3)
     for axes, (one, two) in zip(all_axes, ((0, 2), (1, 2), (0, 1)), strict=True):
         dots = axes.scatter(tips[order, one], tips[order, two], **scale)
@@ -47,7 +48,7 @@ def workspace(samples: Workspace) -> Any:
         axes.set_xlim(centre[one] - half, centre[one] + half)
         axes.set_ylim(centre[two] - half, centre[two] + half)
         axes.grid(alpha=0.3)
-    all_axes[0].legend(loc="lower left", fontsize=9)
+    all_axes[0].legend(loc="lower left", fontsize=SMALL)
     figure.colorbar(dots, ax=all_axes, label="manipulability of the tip [m³/rad³]", pad=0.01)
     force = sum((float(np.linalg.norm(wrench[:3])) for wrench in samples.load.wrenches.values()), 0.0)
     load = ([f"{force:.3g} N"] if force > 0.0 else []) + (["gravity"] if samples.load.gravity is not None else [])
@@ -81,8 +82,10 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
 
     across, middle = result.grid.x, len(result.grid.y) // 2
     wide = float(np.ptp(across)) > 0.75 * float(np.ptp(result.grid.z))
-    figure = new_figure((15.0, 5.2) if wide else (11.0, 6.0))
-    reach_axes, payload_axes, pressure_axes = all_axes = figure.subplots(1, 3, sharex=True, sharey=True)
+    figure = new_figure((WIDTH, 6.6 if wide else 9.0))
+    *all_axes, spare = figure.subplots(2, 2).ravel()
+    reach_axes, payload_axes, pressure_axes = all_axes
+    spare.axis("off")
     force = f"{result.loads[level]:.4g} N"
 
     outcomes = outcome(result, level)[:, middle]
@@ -90,12 +93,12 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
     _cells(reach_axes, result, outcomes, cmap=shades, norm=BoundaryNorm(np.arange(5) - 0.5, 4))
     shown = [number for number in (CARRIED, WRINKLED, LOST, NOT_REACHED) if (outcomes == number).any()]
     handles = [Patch(facecolor=SHADES[number], edgecolor="0.3", label=_LABELS[number]) for number in shown]
-    figure.legend(handles=handles, loc="outside lower left", ncols=len(handles), title=f"reach with {force}", fontsize=9)
+    spare.legend(handles=handles, loc="center", title=f"reach with {force}", fontsize=SMALL)
     reach_axes.set_title(f"Reach with {force} on the tip")
 
     payload = np.where(result.reached[:, middle, :, 0], result.payload[:, middle], np.nan)
     drawn = _cells(payload_axes, result, payload, cmap="cividis", vmin=0.0, vmax=float(result.loads[-1]))
-    figure.colorbar(drawn, ax=payload_axes, label=f"largest load without wrinkling, up to {result.loads[-1]:g} N [N]")
+    figure.colorbar(drawn, ax=payload_axes, label="largest load without wrinkling [N]")
     _contours(payload_axes, result, payload, set())
     payload_axes.set_title("Payload")
 
@@ -108,11 +111,12 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
     flat = len(result.grid.y) == 1 and result.grid.y[0] == 0.0
     for axes in all_axes:
         axes.plot(0.0, 0.0, marker="+", color="k", ms=10, ls="none")
-        axes.set(aspect="equal", xlabel="distance from the axis of motor 1 [m]" if flat and across[0] > 0.0 else "x [m]")
-    reach_axes.set_ylabel("height z [m]")
+        axes.set(
+            aspect="equal", xlabel="distance from motor 1 [m]" if flat and across[0] > 0.0 else "x [m]", ylabel="height z [m]"
+        )
     weight = "weightless arm" if result.gravity is None else f"arm under gravity {_components(result.gravity)} m/s²"
     where = "" if flat else f", slice at y = {result.grid.y[middle]:.4g} m"
-    figure.suptitle(f"{plain_words(result.model.pinocchio.name)}: force along {_components(result.direction)}, {weight}{where}")
+    figure.suptitle(f"{plain_words(result.model.pinocchio.name)}: force along {_components(result.direction)}\n{weight}{where}")
     return figure
 
 
@@ -151,7 +155,7 @@ def _contours(axes: Any, result: WorkspaceMap, values: FloatArray, levels: set[f
             # One number for each level, on its longest line: steep places have many short ones.
             longest = [max(segments, key=len) for segments in lines.allsegs if segments]
             places = [segment[len(segment) // 2] for segment in longest if len(segment) > 1]
-            for text in axes.clabel(lines, fmt=label.format, fontsize=9, manual=places):
+            for text in axes.clabel(lines, fmt=label.format, fontsize=SMALL, manual=places):
                 text.set_path_effects([withStroke(linewidth=2.0, foreground=edge)])
             lines.set_path_effects([withStroke(linewidth=1.6, foreground=edge)])
 
