@@ -53,7 +53,7 @@ def document(found: rendering.Rows) -> dict[str, str]:
         figures.append(f"### Figures: {paper.title}")
         for short, picture in PICTURES[name].items():
             file = picture.elsewhere or f"{PREFIX}{short}.png"
-            figures += [f"![{picture.caption.partition(':')[0]}](images/{file})", f"*{picture.caption}*"]
+            figures += [f"![{picture.caption.partition('. ')[0].rstrip('.')}](images/{file})", f"*{picture.caption}*"]
     return {"reproduction": rendering.markdown(found), "reproduction-figures": "\n\n".join(figures)}
 
 

@@ -352,6 +352,16 @@ def test_every_command_has_an_example_and_its_help() -> None:
     assert typed == set(action.choices)
 
 
+def test_every_picture_says_what_one_sees() -> None:
+    """A screen reader reads the text between the brackets: some words, not the name of the file."""
+    seen = [picture for name in PAGES for picture in re.findall(r"!\[([^\]]*)\]\(([^)\s]+)", page_text(name))]
+    assert len(seen) > 50
+    for words, file in seen:
+        assert len(words) >= 20, file
+        assert len(words.split()) >= 4, file
+        assert Path(file).name not in words, file
+
+
 def test_links_and_pictures_lead_somewhere() -> None:
     for name in (*PAGES, "CONTRIBUTING.md"):
         text = re.sub(r"```.*?```", "", page_text(name), flags=re.DOTALL)

@@ -13,17 +13,8 @@ import numpy as np
 from softrobots.core.checks import FloatArray, instance_of
 from softrobots.identification.identification import UNITS, Comparison, Identification
 from softrobots.identification.uncertainty import CONFIDENCE, Uncertainty
-from softrobots.view.figures.canvas import (
-    COLOURS,
-    MARKERS,
-    SMALL,
-    WIDTH,
-    grid_and_legend,
-    new_figure,
-    new_panels,
-    new_plot,
-    plain_words,
-)
+from softrobots.view.figures import canvas
+from softrobots.view.figures.canvas import COLOURS, MARKERS, grid_and_legend, new_figure, new_panels, new_plot, plain_words
 
 _MOST_PANELS = 12  # panels of predicted against measured
 _MOST_PAIRS = 6  # confidence ellipses
@@ -70,7 +61,7 @@ def residuals(result: Identification) -> Any:
     instance_of("result", result, Identification, "an Identification")
     rows = result.fitted.measurements
     parts = [(key, part) for key in rows.measured for part in _parts(result.fitted, key)]
-    figure = new_figure((WIDTH, 1.2 + 2.4 * len(parts)))
+    figure = new_figure((canvas.WIDTH, 1.2 + 2.4 * len(parts)))
     panels = figure.subplots(len(parts), 1, sharex=True, squeeze=False)[:, 0]
     for axes, (key, part) in zip(panels, parts, strict=True):
         scale, unit = _SMALL.get(part.unit, (1.0, part.unit))
@@ -149,7 +140,7 @@ def values(result: Identification) -> Any:
     """
     instance_of("result", result, Identification, "an Identification")
     intervals, blocks = result.intervals, result.block_intervals
-    figure, axes = new_plot((WIDTH, 1.5 + 0.42 * len(result.parameters)), title="Parameters before and after the fit")
+    figure, axes = new_plot((canvas.WIDTH, 1.5 + 0.42 * len(result.parameters)), title="Parameters before and after the fit")
     axes.grid(visible=False)
     for place, (one, value) in enumerate(zip(result.parameters, result.solution.tolist(), strict=True)):
         ends = intervals[one.name]
@@ -169,7 +160,7 @@ def values(result: Identification) -> Any:
         axes.plot(at(one.value), place, ls="", marker="D", ms=7, mfc="white", color="0.35")
         axes.plot(at(value), place, ls="", marker="o", ms=7, color=COLOURS[0])
         words = f"{ends[0]:.4g} .. {ends[1]:.4g}" if np.isfinite(ends).all() else "not determined"
-        axes.text(1.09, place, f"{value:.4g} ({words}) {one.unit}", va="center", fontsize=SMALL)
+        axes.text(1.09, place, f"{value:.4g} ({words}) {one.unit}", va="center", fontsize=canvas.SMALL)
     handles = [
         axes.plot([], [], ls="", marker="D", ms=7, mfc="white", color="0.35", label="start")[0],
         axes.plot([], [], ls="", marker="o", ms=7, color=COLOURS[0], label="fitted")[0],
@@ -197,20 +188,19 @@ def correlation(result: Identification) -> Any:
     instance_of("result", result, Identification, "an Identification")
     kept = np.flatnonzero(result.by_rows.determined)
     found = result.by_rows.correlation[np.ix_(kept, kept)]
-    size = min(2.8 + 0.42 * len(kept), WIDTH - 0.9)
+    size = min(2.8 + 0.42 * len(kept), canvas.WIDTH - 0.9)
     figure = new_figure((size + 0.9, size))
     axes = figure.add_subplot(title="Correlation of the errors")
     image = axes.imshow(found, cmap="PuOr", vmin=-1.0, vmax=1.0)
     names = [plain_words(result.names[number]) for number in kept]
     every = -(-len(kept) // _MOST_BESIDE)  # names of more would lie upon each other
-    axes.set_xticks(range(0, len(kept), every), names[::every], rotation=90, fontsize=SMALL)
-    axes.set_yticks(range(0, len(kept), every), names[::every], fontsize=SMALL)
+    axes.set_xticks(range(0, len(kept), every), names[::every], rotation=90, fontsize=canvas.SMALL)
+    axes.set_yticks(range(0, len(kept), every), names[::every], fontsize=canvas.SMALL)
     if len(kept) <= _MOST_WRITTEN:
         for (row, column), number in np.ndenumerate(found):
             text = f"{number:.1f}".replace("-0.0", "0.0")
-            axes.text(
-                column, row, text, ha="center", va="center", fontsize=SMALL, color="white" if abs(number) > 0.7 else "0.1"
-            )
+            style = {"fontsize": canvas.SMALL, "color": "white" if abs(number) > 0.7 else "0.1"}
+            axes.text(column, row, text, ha="center", va="center", **style)
     figure.colorbar(image, ax=axes, shrink=0.7)
     return figure
 
