@@ -22,8 +22,7 @@ import numpy as np
 
 from softrobots.compiled.drivers import intrinsics
 from softrobots.compiled.program.generated_module import Program
-from softrobots.compiled.run.motion_batches import MotionBatches
-from softrobots.compiled.run.numpy_batches import NumpyBatches
+from softrobots.compiled.run.numpy_batches import MotionBatches, NumpyBatches
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import MissingDependency, OutputError
 from softrobots.core.files import write_text

@@ -9,8 +9,7 @@ import numpy as np
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.batches import batch_rows, unusable, without
 from softrobots.compiled.run.motion_course import SpringKicks, forces_of_steps, motors_of_steps
-from softrobots.compiled.run.motion_results import MotionBatch
-from softrobots.compiled.run.results import EquilibriumBatch
+from softrobots.compiled.run.results import EquilibriumBatch, MotionBatch
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel

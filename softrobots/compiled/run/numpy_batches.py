@@ -1,4 +1,4 @@
-"""Batches without a compiler: the passes on blocks of cases, every element of the workspace a NumPy array.
+"""Batches without a compiler, statics and motion: the passes on blocks of cases, every element of the workspace a NumPy array.
 
 The straight-line functions are those of single cases, with NumPy's intrinsics. Cases that the passes do not solve go through
 the drivers one by one, in plain floats.
@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.drivers.lane_drivers import Places, Rows
+from softrobots.compiled.motion_settings import EXTRAPOLATION, KEPT_STEPS, MOTION_CORRECTIONS
 from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.settings import CHUNK, FORCE_PASSES, OBSERVABLE, PASSES
 from softrobots.compiled.statuses import Status
@@ -102,3 +103,104 @@ class NumpyBatches:
         for one, value in zip(w, case, strict=True):
             one[lane] = value
         return status
+
+
+class MotionBatches:
+    """The batch function of `softrobots.compiled.drivers.motion_lane_drivers` for NumPy."""
+
+    def __init__(self, module: ModuleType, vectorised: ModuleType, program: Program) -> None:
+        """Run the straight-line functions of a program on arrays by `vectorised`, and single cases by `module`."""
+        self._alone, self._functions, self._layout, self._size = module, vectorised, program.layout, program.size
+
+    def motion_batch(
+        self,
+        inputs: Rows,
+        places: Places,
+        motors: Any,
+        forces: Any,
+        grid: Any,
+        times: Any,
+        out: Any,
+        statuses: Any,
+        first: int,
+        last: int,
+    ) -> None:
+        """Take the steps of many cases; see `motion_lane_drivers`."""
+        for begin in range(first, last, BLOCK):
+            rows = slice(begin, min(begin + BLOCK, last))
+            own = [values[rows] if len(values) > 1 else values for values in (*inputs, motors, forces)]
+            failed = self._block(own[:-2], places, own[-2], own[-1], grid, times, out[rows])
+            statuses[rows] = Status.CERTIFIED
+            for lane in np.flatnonzero(failed):
+                case = [0.0] * self._size
+                picked = [values[min(lane, len(values) - 1)] for values in own]
+                for place, values in zip(places, picked[:-2], strict=True):
+                    case[place : place + len(values)] = values.tolist()
+                paths = picked[-2].ravel().tolist(), len(picked[-2]), picked[-1].ravel().tolist(), len(picked[-1])
+                found = [0.0] * out[begin].size
+                end = grid.tolist(), len(grid) - 1, times.tolist(), len(times), found
+                statuses[begin + lane] = self._alone.motion_run(case, *paths, *end)
+                out[begin + lane] = np.reshape(found, out[begin].shape)
+
+    def _block(self, inputs: Any, places: Places, motors: Any, forces: Any, grid: Any, times: Any, out: Any) -> Any:
+        """Take the steps of a block of cases; return the mask of those that fail."""
+        layout, functions, count = self._layout, self._functions, len(out)
+        n, m = layout.unknowns, layout.motors
+        w: list[Any] = [0.0] * self._size
+        w[layout.position : layout.velocity + n] = np.zeros((2 * n, count))
+        w[layout.history : layout.history + KEPT_STEPS * n] = np.zeros((KEPT_STEPS * n, count))
+        for place, values in zip(places, inputs, strict=True):
+            w[place : place + values.shape[1]] = list(values.T)
+        failed = np.zeros(count, dtype=bool)
+        n_history = row = 0
+        with np.errstate(all="ignore"):
+            for step, length in enumerate(np.diff(grid).tolist()):
+                if step and abs(length - (grid[step] - grid[step - 1])) > 1e-9 * length:
+                    n_history = 0
+                weights = EXTRAPOLATION[KEPT_STEPS * min(n_history, KEPT_STEPS) :][:KEPT_STEPS]
+                w[layout.time_step], w[layout.whole_step], w[layout.share] = length, length, 0.5
+                w[layout.weights : layout.weights + KEPT_STEPS] = weights
+                for k, place in enumerate((layout.motors_begin, layout.motors_middle, layout.motors_end)):
+                    w[place : place + m] = list(motors[:, min(2 * step + k, motors.shape[1] - 1)].T)
+                w[layout.force : layout.force + 3] = list(forces[:, min(step, forces.shape[1] - 1)].T)
+                w[layout.begin_position : layout.begin_velocity + n] = w[layout.position : layout.velocity + n]
+                failed |= ~self._step(w, failed, n_history)
+                n_history += 1
+                while row < len(times) and (times[row] <= grid[step + 1] or step == len(grid) - 2):
+                    share = (times[row] - grid[step]) / length
+                    w[layout.share] = 1.0 if share > 1.0 - 1e-9 else share
+                    for i in range(n):
+                        functions.interpolate_unknown(w, i)
+                    for i in range(m):
+                        functions.place_motor(w, i)
+                    functions.motion_tip(w)
+                    found = [*w[layout.unknown : layout.unknown + 2 * n], *w[layout.tip : layout.tip + 3]]
+                    out[:, row] = np.stack([np.broadcast_to(one, count) for one in found], axis=1)
+                    row += 1
+        return failed
+
+    def _step(self, w: list[Any], failed: Any, n_history: int) -> Any:
+        """Take a step; return the mask of the cases whose corrections have converged."""
+        layout, functions = self._layout, self._functions
+        for i in range(layout.motors):
+            functions.place_motor(w, i)
+        functions.motion_prepare(w)
+        for i in range(layout.unknowns):
+            functions.guess_unknown(w, i)
+        w[layout.last_change] = np.full(len(failed), 1e300)
+        for correction in range(MOTION_CORRECTIONS):
+            if correction == 1 or correction + n_history == 0:
+                functions.motion_factor(w)
+            else:
+                functions.motion_correct(w)
+            w[layout.change] = np.zeros(len(failed))
+            for i in range(layout.unknowns):
+                functions.apply_correction(w, i)
+            functions.judge_corrections(w)
+            settled = w[layout.settled] > 0.5
+            if np.all(settled | failed):
+                break
+            w[layout.last_change] = w[layout.change]
+        for i in range(layout.unknowns):
+            functions.finish_unknown(w, i)
+        return settled

@@ -1,10 +1,12 @@
-"""Results of the compiled solvers, of one case or many."""
+"""Results of the compiled solvers of statics and motion, of one case or many."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, fields
-from typing import Any
+from functools import cached_property
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -14,6 +16,7 @@ from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.result_file import TABLES
 from softrobots.core.summary import Part, Summarised, Table, facts, field_facts
+from softrobots.dynamics.motion import Motion, MotionEnergy
 
 
 class CompiledEquilibrium(Summarised):
@@ -122,8 +125,26 @@ class CompiledLoadEstimate(CompiledEquilibrium):
         return self._root("observed")
 
 
+class CaseResults(Summarised):
+    """Results of many cases."""
+
+    status: Any
+    """`Status` of each case, shape (n,)."""
+
+    def __post_init__(self) -> None:
+        """Make the arrays read-only."""
+        for array in vars(self).values():
+            if isinstance(array, np.ndarray):
+                array.setflags(write=False)
+
+    @property
+    def certified(self) -> Any:
+        """Mask of the valid cases, shape (n,)."""
+        return self.status == Status.CERTIFIED
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class Batch(Summarised):
+class Batch(CaseResults):
     """Common results of all batches, one row a case."""
 
     q_springs: FloatArray
@@ -133,21 +154,10 @@ class Batch(Summarised):
     residual: FloatArray
     """Norm of the out-of-balance torque, shape (n,) [N m]; infinite for input that is not finite."""
 
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for array in vars(self).values():
-            if array is not None:
-                array.setflags(write=False)
-
     def summary_parts(self) -> list[Part]:
         """Return how many cases have which status, and the ranges of their numbers."""
         counts = [(f"cases {status.name.lower().replace('_', ' ')}", str(number)) for status, number in self.counts().items()]
         return [facts([*counts, *field_facts(self, *(one.name for one in fields(self) if one.name != "status"))])]
-
-    @property
-    def certified(self) -> Any:
-        """Mask of the valid rows, shape (n,)."""
-        return self.status == Status.CERTIFIED
 
     def counts(self) -> dict[Status, int]:
         """Return the number of cases by status, without statuses that did not occur."""
@@ -207,3 +217,68 @@ def _table(batch: Batch) -> dict[str, FloatArray]:
 
 
 TABLES[Batch] = _table
+
+
+@dataclass(frozen=True, eq=False, init=False, repr=False)
+class CompiledMotion(Motion):
+    """A `Motion` whose torques and energies are computed when they are asked for, from all steps of the same motion again."""
+
+    def __init__(self, replay: Callable[[FloatArray, FloatArray], Motion], **known: Any) -> None:
+        """Take the other fields of a `Motion`, and a function of its steps and rows that returns it with all of them."""
+        vars(self).update(
+            {name: read_only(value) if isinstance(value, np.ndarray) else value for name, value in known.items()},
+            _replay=replay,
+        )
+
+    @cached_property
+    def _whole(self) -> Motion:
+        replay: Callable[[FloatArray, FloatArray], Motion] = vars(self)["_replay"]
+        return replay(self.steps, self.time)
+
+    @cached_property  # type: ignore[misc]
+    def motor_torques(self) -> FloatArray:
+        """Load that each motor carries, with that of the accelerated masses, shape (n, n_motors) [N m or N]."""
+        return self._whole.motor_torques
+
+    @cached_property  # type: ignore[misc]
+    def energy(self) -> MotionEnergy:
+        """Energies and their balance."""
+        return self._whole.energy
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickle as a `Motion`."""
+        return Motion, tuple(getattr(self, field.name) for field in fields(Motion))
+
+
+class StepEnd(NamedTuple):
+    """State at the end of a step of time."""
+
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n_springs,) [rad or m]."""
+    velocities: FloatArray
+    """Their rates, shape (n_springs,) [rad/s or m/s]."""
+    tip_position: FloatArray
+    """The tip, shape (3,) [m], world axes."""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class MotionBatch(CaseResults):
+    """Motions of many cases, at the same times."""
+
+    time: FloatArray
+    """Times of the rows, shape (t,) [s]."""
+    q_springs: FloatArray
+    """Elastic coordinates, shape (n, t, n_springs) [rad or m]."""
+    velocities: FloatArray
+    """Their rates, shape (n, t, n_springs) [rad/s or m/s]."""
+    tip_position: FloatArray
+    """The tip, shape (n, t, 3) [m], world axes."""
+    status: Any
+    """`Status` of each case, shape (n,), small integers; only rows with `Status.CERTIFIED` are valid."""
+    steps: FloatArray
+    """Times at the ends of all steps, the first included, shape (m,) [s]."""
+    tip_error: FloatArray | None = None
+    """Measured error of the tip, the largest of all rows, with a safety factor of 1.2, shape (n,) [m]; None for fixed steps,
+    where it is not measured."""
+    tolerance: float | None = None
+    """Largest `tip_error` that was asked for [m]; None for fixed steps."""
