@@ -15,7 +15,7 @@ from softrobots import helix
 from softrobots.helix.atlas import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
 from softrobots.inflated_beam import TABLE_3
 from softrobots.view.figures import helices, inflated_link, trajectories
-from softrobots.view.figures.canvas import COLOURS, equal_box, new_figure
+from softrobots.view.figures.canvas import COLOURS, WIDTH, equal_box, new_figure
 from softrobots.view.figures.helix_sheet import draw, sheet
 from studies.papers import pcc_equations, pcc_two_segments
 from studies.papers.arm_path import GAIN, movement
@@ -51,8 +51,8 @@ def tracking() -> Any:
 
 def two_segments() -> Any:
     """The arm of our example with both frames, and the azimuth by (34): [PCC paper]."""
-    figure = new_figure((12.0, 5.6))
-    left, right = figure.add_subplot(1, 2, 1, projection="3d"), figure.add_subplot(1, 2, 2)
+    figure = new_figure((WIDTH, 9.6))
+    upper, lower = figure.add_subplot(2, 1, 1, projection="3d"), figure.add_subplot(2, 1, 2)
     arcs = [cc.arc_from_muscles(lengths, pcc_two_segments.DISTANCE) for lengths in pcc_two_segments.LENGTHS]
     everything = [np.zeros((1, 3))]
     fractions = np.linspace(0.0, 1.0, 60)
@@ -67,14 +67,14 @@ def two_segments() -> Any:
         for number, (points, face) in enumerate(zip(parts, (colour, "white"), strict=True)):
             label = f"segment 2, {note}" if number else None
             shade = "0.25" if number == 0 else colour
-            left.plot(*points.T, color=shade, lw=3.0 if number == 0 else 2.2, ls="-" if number == 0 else style, label=label)
-            left.plot(*points[-1:].T, color=shade, marker="o", mfc=face if number else shade, ls="none")
+            upper.plot(*points.T, color=shade, lw=3.0 if number == 0 else 2.2, ls="-" if number == 0 else style, label=label)
+            upper.plot(*points[-1:].T, color=shade, marker="o", mfc=face if number else shade, ls="none")
         everything += [*parts, end[None, :3, 3]]
-    left.plot([], [], color="0.25", lw=3.0, label="segment 1")
-    left.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Tip of two segments, our example")
-    equal_box(left, np.vstack(everything))
-    left.locator_params(nbins=5)
-    left.legend(loc="upper left", fontsize=9)
+    upper.plot([], [], color="0.25", lw=3.0, label="segment 1")
+    upper.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Tip of two segments, our example")
+    equal_box(upper, np.vstack(everything))
+    upper.legend(loc="center right", bbox_to_anchor=(0.2, 0.5), fontsize=9)
+    figure.get_layout_engine().set(hspace=0.08)
     azimuth = np.radians(np.arange(-179.5, 180.0))
     lengths = cc.muscles_from_arc(
         cc.Arc(np.full_like(azimuth, 0.524), np.ones_like(azimuth), azimuth), pcc_two_segments.DISTANCE
@@ -82,17 +82,17 @@ def two_segments() -> Any:
     given, plain = np.degrees(azimuth), np.degrees(pcc_equations.azimuth(lengths))
     plain[np.append(np.abs(np.diff(plain)) > 90.0, False)] = np.nan  # no line across the jumps
     whole = np.degrees(cc.arc_from_muscles(lengths, pcc_two_segments.DISTANCE).azimuth)
-    right.plot(given, whole, color=COLOURS[0], lw=2.4, label="atan2 of (33) and (32)")
-    right.plot(given, plain, color=COLOURS[1], lw=2.0, ls="--", label="arctangent of (34) as printed")
-    right.set(
+    lower.plot(given, whole, color=COLOURS[0], lw=2.4, label="atan2 of (33) and (32)")
+    lower.plot(given, plain, color=COLOURS[1], lw=2.0, ls="--", label="arctangent of (34) as printed")
+    lower.set(
         xlabel="direction of bending [degrees]",
         ylabel="azimuth from the muscle lengths [degrees]",
         title="Azimuth from the lengths of three muscles",
         xticks=range(-180, 181, 60),
         yticks=range(-180, 181, 60),
     )
-    right.grid(alpha=0.3)
-    right.legend(fontsize=9, loc="upper left")
+    lower.grid(alpha=0.3)
+    lower.legend(fontsize=9, loc="upper left")
     return figure
 
 

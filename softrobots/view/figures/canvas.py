@@ -130,7 +130,7 @@ def equal_box(axes: Any, points: FloatArray, eye: Any = (0.44, -0.82, 0.38)) -> 
         getattr(axes, f"set_{name}lim")(low, high)
         getattr(axes, f"{name}axis").get_major_locator().set_params(nbins=max(2, round(5 * (high - low) / (2 * half.max()))))
     axes.zaxis.labelpad = 9.0
-    axes.set_box_aspect(half / half.max())
+    axes.set_box_aspect(half / half.max(), zoom=0.9)
     x, y, z = np.asarray(eye) / np.linalg.norm(eye)
     axes.view_init(elev=np.degrees(np.arcsin(z)), azim=np.degrees(np.arctan2(y, x)))
 

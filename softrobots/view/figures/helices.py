@@ -153,7 +153,9 @@ def grasp(test: helix.GraspTest = helix.PAPER_CYLINDER, pressure: float = 10e3) 
         grid_and_legend(axes, loc="upper left" if axes is upper else "lower right")
     halves = f" in halves {1e3 * test.gap:.3g} mm apart" if test.gap else ""
     case = f"object {200 * test.object_radius:.3g} cm thick{halves}, tube {100 * test.diameter:.3g} cm, {test.turns:.3g} turns"
-    figure.suptitle(f"Grasp force: our model, not data of the paper\n({case}, {100 * test.turn_height:.3g} cm rise per turn)")
+    figure.suptitle(
+        f"Grasp force: our model, not data of the paper\n({case}, {100 * test.turn_height:.3g} cm rise per turn)", fontsize=10
+    )
     return figure
 
 

@@ -124,7 +124,7 @@ def tip_errors(errors: dict[str, FloatArray], times: FloatArray, *, angles: bool
     every = max(len(moments) // 10, 1)
     for number, (label, error) in enumerate(lines.items()):
         axes.semilogy(moments, np.maximum(error, 1e-16) * 1e3, markevery=every, label=label, **line_style(number))
-    figure.legend(fontsize=9, loc="outside lower center", ncols=min(len(lines), 3))
+    figure.legend(fontsize=9, loc="outside lower center", ncols=min(len(lines), 2))
     return figure
 
 
