@@ -25,7 +25,7 @@ ROBOTS: dict[str, Callable[[], Any]] = {
     "helix": sr.HelixTube,
 }
 STARTS = {"arm": {"q_motors": (0.3, 0.6, -0.8), "force": (0, 10, -15)}, "helix": {"gravity": sr.EARTH_GRAVITY}}
-SIZES = {"wide": (1280, 800), "phone": (390, 844), "frame": (400, 460)}
+SIZES = {"wide": (760, 460), "phone": (390, 844), "frame": (400, 460)}
 
 
 class Tab:

@@ -101,7 +101,7 @@ def _page(model: SoftModel, title: str | None, q_motors: Any, force: Any, gravit
     data = robot_data(solve_equilibrium(model, model.relaxed_motors), largest)
     data["start"] = {"motors": motors.tolist(), "force": push.tolist(), "gravity": weight}
     kinds = _kinds(model)
-    return interactive_text(data, solver, title or str(model.pinocchio.name), kinds, _legend(model, data))
+    return interactive_text(data, solver, title or str(model.pinocchio.name).replace("_", " "), kinds, _legend(model, data))
 
 
 def _kinds(model: SoftModel) -> str:
