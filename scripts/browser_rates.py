@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
 
 import softrobots as sr
+from softrobots.cli.options.command_line import exit_status
 from softrobots.compiled.run.compiled_model import compile_model
 from softrobots.view.browser import open_browser
 
@@ -45,4 +48,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(exit_status(main))

@@ -16,6 +16,9 @@ import nbformat
 from nbclient import NotebookClient
 from PIL import Image
 
+from softrobots.cli.options.command_line import exit_status
+from softrobots.core.files import write_text
+
 FOLDER = Path(__file__).resolve().parent.parent / "docs" / "notebooks"
 NAMES = tuple(sorted(path.stem for path in FOLDER.glob("*.ipynb")))
 
@@ -47,11 +50,14 @@ def main(argv: list[str] | None = None) -> int:
     """Run each notebook."""
     parser = argparse.ArgumentParser(description=__doc__.split("\n\n")[0])
     parser.add_argument("--only", nargs="+", choices=NAMES, default=NAMES, help="notebooks to run (all)")
-    for name in parser.parse_args(argv).only:
-        text = stored(FOLDER / f"{name}.ipynb")
-        (FOLDER / f"{name}.ipynb").write_text(text, encoding="utf-8")
-        print(f"{name}: {len(text) / 1000:.0f} kB")
-    return 0
+    names = parser.parse_args(argv).only
+
+    def run() -> None:
+        for name in names:
+            text = stored(FOLDER / f"{name}.ipynb")
+            print(f"{write_text(FOLDER / f'{name}.ipynb', text, overwrite=True)}: {len(text) / 1000:.0f} kB")
+
+    return exit_status(run)
 
 
 if __name__ == "__main__":

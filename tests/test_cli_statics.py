@@ -729,7 +729,7 @@ REFUSED = [
     (("ik", "inflatable_arm"), "one of the arguments --target --waypoints is required"),
     (("ik", *TARGET, "--waypoints", CSV), "not allowed with argument --target"),
     (("ik", *TARGET, "--start", "1"), "(it has shape (1,)): motor_1 [rad]"),
-    (("ik", *TARGET, "--start", "9", "0", "0"), "within the motor limits"),
+    (("ik", *TARGET, "--start", "4", "0", "0"), "within the motor limits"),
     (("ik", *TARGET, "--elbow", "left"), "invalid choice: 'left'"),
     (
         ("ik", *TARGET, "--orientation", "1", "0", "0"),

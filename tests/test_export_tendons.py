@@ -299,7 +299,7 @@ def test_what_a_simulator_does_not_have_is_refused_by_name() -> None:
     with pytest.raises(sr.ParameterError, match=r'muscle_1_1.*actuators="welded".*McKibben'):
         to_mjcf(mckibben)
     with pytest.raises(sr.ParameterError, match="within the limits of tendon_1_1"):
-        to_mjcf(elastic, (1.0, *MOTORS[1:]))
+        to_mjcf(elastic, (0.5, *MOTORS[1:]))
     loose = sr.load_model(sr.TendonArm(segment_lengths=THIN, tendon_stiffness=10.0, chain="lumped", hinges=2))
     with pytest.raises(sr.ParameterError, match="taut at any length"):
         to_mjcf(loose, actuators="welded")

@@ -773,6 +773,8 @@ DOORWAYS = {
     "cli.simulate": "tables of numbers, through the same door as tables of measurements",
     "cli.doctor": "compares a file with what is generated, byte for byte",
     "studies.shared.recorded_run": "a page of the checkout",
+    "studies.measured.comparison": "tables of the checkout",
+    "studies.measured.recorded_arm": "runs recorded in the checkout",
     "studies.mutation.mutants": "what the tool has just written",
     "compiled.translate.c": "a file of ours in C",
     "compiled.browser.script": "a file of ours in JavaScript",
@@ -782,6 +784,7 @@ DOORWAYS = {
     "studies.fuzzing.worker": "a file of the kernel",
     "studies.interop.results": "a page of the checkout, and the results that the study itself wrote",
     "studies.benchmark.processes": "a file of the kernel",
+    "view.interactive.text": "scripts and a template of ours",
     "view.meshcat_page.server_process": "a page of ours",
     "view.meshcat_page.page_text": "a template of ours",
 }

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
-from softrobots.core.errors import FileFormatError
+from softrobots.core.json_text import read_json
 from studies.measured.comparison import Overview
 from studies.shared.recorded_run import FOLDER
 
 ROBOT = "[arm of nine tendons, 0.19 m](measured_arm.md)"
 SOURCE = "[OpenCR](references.md#robots), 2063 rows"
+_LARGEST = 2**20  # bytes
 
 
 def read_record(checkout: Path, name: str) -> dict[str, Any]:
@@ -20,11 +20,7 @@ def read_record(checkout: Path, name: str) -> dict[str, Any]:
     Raises:
         FileFormatError: If there are none.
     """
-    path = checkout / FOLDER / f"{name}.json"
-    try:
-        found: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, ValueError) as error:
-        raise FileFormatError(f"cannot read {path}: {error}") from error
+    found: dict[str, Any] = read_json(checkout / FOLDER / f"{name}.json", _LARGEST)
     return found
 
 
