@@ -29,7 +29,8 @@ from tests.support.laws import law
 from tests.support.oracles import flexible_table
 from tests.support.packed_pages import scene_of
 
-angles = st.tuples(*[st.one_of(st.sampled_from([0.0, math.pi, -math.pi / 2]), st.floats(-7.0, 7.0))] * 3)  # more looks like degrees
+# Larger angles look like degrees.
+angles = st.tuples(*[st.one_of(st.sampled_from([0.0, math.pi, -math.pi / 2]), st.floats(-7.0, 7.0))] * 3)
 
 # --- Models
 
