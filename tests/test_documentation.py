@@ -201,6 +201,8 @@ def test_a_status_that_is_told_is_required(tmp_path: Path) -> None:
         ("1e-10", "2e-10", True),
         ("1e-10", "3e-10", False),
         ("1.5e3", "1.6e3", True),
+        ("1.8e-12", "7e-12", True),
+        ("1.8e-12", "1.8e-3", False),
         ("motor_1", "motor_2", False),
         ("a  b\n", "a b", True),
         ("1.5", "nan", False),

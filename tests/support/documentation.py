@@ -45,6 +45,8 @@ from tests.conftest import CHECKOUT
 LANGUAGES = ("python", "py", "text", "sh", "console", "math", "xml", "c", "html")
 PROGRAMS = ("softrobots", "python", "cat", "ls", "head", "gcc", "mkdir")
 """What lines of a shell may start with."""
+ROUNDING = 1e-11
+"""Numbers of an output that are smaller differ from one processor to the next."""
 NUMBER = re.compile(r"(?<![\w.])-?\d+(?:\.\d*)?(?:[eE][+-]?\d+)?(?![\w])")
 
 _FENCE = re.compile(r"^( *)(`{3,}|~{3,})(.*)$")
@@ -105,7 +107,7 @@ def blocks(text: str, name: str) -> list[Block]:
 
 
 def differences(told: str, printed: str) -> list[str]:
-    """Lines of an output that are not as told; numbers may differ by one in their last digit."""
+    """Lines of an output that are not as told; numbers may differ by one in their last digit, and rounding by itself."""
     expected, got = ([" ".join(line.split()) for line in text.strip().splitlines()] for text in (told, printed))
     if len(expected) != len(got):
         return [f"{len(expected)} lines are told, {len(got)} printed:\n{printed}"]
@@ -124,6 +126,8 @@ def _same_number(told: str, printed: str) -> bool:
     digits, _, exponent = told.lower().partition("e")
     if "." not in digits and not exponent:
         return False  # a count
+    if 0.0 < abs(float(told)) < ROUNDING:
+        return abs(float(printed)) < ROUNDING
     unit = 10.0 ** (int(exponent or 0) - len(digits.partition(".")[2]))
     return abs(float(told) - float(printed)) <= 1.001 * unit  # both are rounded
 
