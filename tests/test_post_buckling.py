@@ -447,8 +447,10 @@ def test_bad_input_is_refused(arm: sr.SoftModel, options: dict, error: type[Exce
 def test_the_figure_shows_what_is_stable_and_what_is_not(tool: Callable[[str], ModuleType]) -> None:
     tool("matplotlib")
     found = sr.post_buckling_branches(link(None, 172.71), (0, 0), PUSH)
-    left, right = equilibria.branches(found, (0, 0, 2)).axes
-    assert [text.get_text() for text in left.get_legend().get_texts()] == [branch.label for branch in found]
+    figure = equilibria.branches(found, (0, 0, 2))
+    left, right = figure.axes
+    (legend,) = figure.legends
+    assert [text.get_text() for text in legend.get_texts()] == [branch.label for branch in found]
     for row, branch in enumerate(found):
         whole, dashed = (np.asarray(line.get_ydata(), dtype=float) for line in left.lines[2 * row : 2 * row + 2])
         ways = 1e3 * np.array([one.tip_position[2] for one in branch.equilibria])
