@@ -57,6 +57,11 @@ CASES: list[tuple[Callable[[], Any], str]] = [
     (lambda: sr.InflatableArm(stiffness=172.71, link_lengths=(60, 60)), "link_lengths = 60 m is 100 times the usual 0.6 m"),
     (lambda: sr.InflatableArm(stiffness=172.71, radius=55), "looks like millimetres (did you mean 0.055 m?)"),
     (lambda: sr.InflatableArm(motor_limit=180), "motor_limit = 180 rad is"),
+    (
+        lambda: sr.InflatableArm(stiffness=172.71, pressure=50),
+        "pressure = 50 Pa is next to nothing; it looks like kPa, bar or MPa",
+    ),
+    (lambda: sr.InflatableArm(young_modulus=138), "young_modulus = 138 Pa is next to nothing"),
     (lambda: sr.TendonArm(tendon_distance=(4.5, 4.5, 4.5), radius=0.006), "tendon_distance = 4.5 m is 1e+03 times the usual"),
     (lambda: arc_from_muscles([50, 53, 55], 0.04), "72.65 rad, 11.6 turns: are lengths and distance in m?"),
 ]
@@ -114,3 +119,33 @@ def test_the_command_asks_in_one_line_and_refuses_centimetres(capsys: pytest.Cap
     assert main(["pcc", "forward", "50", "53", "55", "54", "51", "52"]) == 2
     assert "L1 = 50 m is 95.4 times the usual 0.524 m; it looks like centimetres" in capsys.readouterr().err
     assert main(["pcc", "forward", "50", "53", "55", "54", "51", "52", "--rest", "52", "--distance", "4"]) == 0
+
+
+@each_row(
+    ("call", "text"),
+    [
+        (lambda: sr.load_model(sr.InflatableArm), "a robot, not its class: InflatableArm(), with parentheses"),
+        (lambda: sr.solve_equilibrium(ARM, (0, 0, 0), gravity=9.81), "EARTH_GRAVITY is (0, 0, -9.81)"),
+        (
+            lambda: sr.solve_equilibrium(ARM, {"motor_1": 0.1, "motor_2": 0.2, "motor_3": "a"}),
+            "q_motors['motor_3'] = 'a': q_motors['motor_3'] must be a number: motor_3 [rad] (-3.142 to 3.142)",
+        ),
+        (lambda: sr.follow_trajectory(ARM, sr.straight_line((0.9, -0.3, 0.2), (0.9, 0.3, 0.2), 2.0, 20)), "its .targets"),
+        (lambda: sr.identify(sr.InflatableArm(), [1, 2], ("stiffness",)), "Measurements.from_csv"),
+        (lambda: sr.solve_ik(ARM, (90, 30, 20)), "; its reach is 1.2 m"),
+    ],
+)
+def test_errors_tell_the_cure_of_common_mistakes(call: Callable[[], Any], text: str) -> None:
+    with pytest.raises(sr.SoftRobotsError) as caught:
+        call()
+    assert text in str(caught.value)
+
+
+def test_gap_and_path_tell_what_they_hold_without_arrays() -> None:
+    gap = sr.solve_equilibrium(ARM, (0, 0, 0)).clearance(sr.Environment([sr.Sphere(0.1, (0.9, 0.0, 0.5))]))
+    path = sr.straight_line((0.9, -0.3, 0.2), (0.9, 0.3, 0.2), 2.0, 20)
+    for told in (gap, path):
+        assert "array" not in str(told) + repr(told)
+        assert "<table" in told._repr_html_()
+    assert "link_2" in gap.summary()
+    assert "sphere_1" in gap.summary()

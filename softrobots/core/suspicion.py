@@ -1,4 +1,4 @@
-"""Numbers that are allowed but look like those of another unit: degrees, centimetres or millimetres."""
+"""Numbers that are allowed but look like those of another unit: degrees, centimetres, millimetres or kilopascals."""
 
 from __future__ import annotations
 
@@ -9,11 +9,13 @@ from collections.abc import Sequence
 
 MOST_STRETCH = 10.0
 """Times its rest length that a muscle can have; what stretches most, soft silicone, tears below that."""
+NEXT_TO_NO_PRESSURE = 200.0
+"""Pressure or modulus [Pa] below which a number is likelier one in kPa, bar or MPa."""
 _MILLIMETRES = 300.0  # times what is usual, from which on millimetres are likelier than centimetres
 
 
 class SuspiciousInputWarning(UserWarning):
-    """A number looks as if it were in another unit: degrees for radians, centimetres or millimetres for metres."""
+    """A number looks as if it were in another unit: degrees for radians, centimetres for metres, kPa for Pa."""
 
 
 def question(text: str) -> None:
@@ -33,6 +35,11 @@ def question_angle(name: str, angle: float) -> None:
 def question_length(name: str, length: float, usual: float) -> None:
     """Ask whether a length [m] that is many times the usual one is one in centimetres or millimetres."""
     question(f"{name} = {length:.6g} m is {other_length(length, usual)}")
+
+
+def question_pressure(name: str, pressure: float) -> None:
+    """Ask whether a pressure or modulus [Pa] that is next to nothing is one in kPa, bar or MPa."""
+    question(f"{name} = {pressure:.6g} Pa is next to nothing; it looks like kPa, bar or MPa (50 kPa = 0.5 bar = 50e3 Pa)")
 
 
 def stretched_too_far(names: Sequence[str], lengths: Sequence[float], rest: Sequence[float]) -> str | None:

@@ -62,6 +62,8 @@ def read_source(source: Any, field: str = "source") -> tuple[str, str]:
     if isinstance(source, str) and source.lstrip("\ufeff \t\r\n").startswith("<"):
         return _with_point_masses(to_urdf(as_unicode(source), "the text"), "the text"), "the text"
     if not isinstance(source, str | Path):
+        if isinstance(source, type):
+            raise ParameterError(field, source, f"a robot, not its class: {source.__name__}(), with parentheses")
         raise ParameterError(field, source, "a robot, a path, or URDF text (or that of MJCF or SDF), or the name of a robot")
     try:
         text = read_xml(Path(source))

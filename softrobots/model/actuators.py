@@ -151,6 +151,9 @@ class Actuators:
             raise ParameterError(field, values, text)
         if not names:
             return np.zeros(0)
+        for name, described in zip(self.names, self.described, strict=True):
+            if np.asarray(values[name]).dtype.kind not in "fiu":
+                raise ParameterError(f"{field}[{name!r}]", values[name], f"a number: {described}")
         try:
             return np.stack(np.broadcast_arrays(*(values[name] for name in self.names)), axis=-1)
         except ValueError as error:

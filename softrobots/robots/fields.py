@@ -18,7 +18,7 @@ import numpy as np
 from softrobots.core.checks import choice, finite_array, finite_number, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.core.field_help import FieldHelp
-from softrobots.core.suspicion import question_angle, question_length
+from softrobots.core.suspicion import NEXT_TO_NO_PRESSURE, question_angle, question_length, question_pressure
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 
@@ -206,6 +206,8 @@ def _within(field: Field[Any], values: tuple[float, ...]) -> tuple[float, ...]:
         question_length(name, largest, usual)
     elif facts.unit == "rad" and abs(largest) > _TURNS:
         question_angle(name, largest)
+    elif facts.unit == "Pa" and 0.0 < abs(largest) < NEXT_TO_NO_PRESSURE:
+        question_pressure(name, largest)
     return values
 
 

@@ -198,6 +198,7 @@ def solve_ik(
             f"within {best.error:.6g} m{'' if goal.rotation is None else f' and {best.angle:.6g} rad'}, "
             f"at {solution.equilibrium.tip_position.round(9).tolist()} m with motors {best.q_motors.round(6).tolist()}"
             + ("" if sided else ", with the elbow on the other side")
+            + (f"; its reach is {model.reach:.4g} m" if np.linalg.norm(goal.position) > 2.0 * model.reach else "")
             + (f"; {solution.wrist_singularity}" if goal.rows == 6 and solution.wrist_singularity else "")
             + (f"; {method!r} found no equilibrium at {unsolved} of the motor coordinates tried" if unsolved else ""),
             best=solution,

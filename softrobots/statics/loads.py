@@ -116,7 +116,7 @@ class Load:
             fixed_environment(environment)
         if gravity is None:
             return cls(total, None, environment)
-        x, y, z = finite_array("gravity", gravity, (3,), "m/s^2").tolist()
+        x, y, z = finite_array("gravity", gravity, (3,), "m/s^2, world axes; EARTH_GRAVITY is (0, 0, -9.81)").tolist()
         return cls(total, (x, y, z), environment)
 
     def same_as(self, other: Load) -> bool:

@@ -13,6 +13,7 @@ from softrobots.core.checks import FloatArray, finite_array, increasing, positiv
 from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path
+from softrobots.core.summary import Summarised
 from softrobots.statics.tip_goal import Goal
 
 _ANGLES = ("roll", "pitch", "yaw")
@@ -20,8 +21,8 @@ _INTERVAL = 0.05  # [s], between waypoints without times
 _MOST_STEPS = 1_000_000
 
 
-@dataclass(frozen=True, eq=False)
-class Path3D:
+@dataclass(frozen=True, eq=False, repr=False)
+class Path3D(Summarised):
     """Target positions over time."""
 
     times: FloatArray

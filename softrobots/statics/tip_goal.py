@@ -67,6 +67,8 @@ class Goal(NamedTuple):
         """
         if isinstance(targets, list | tuple) and targets and all(isinstance(one, pin.SE3) for one in targets):
             targets = [one.homogeneous for one in targets]
+        if isinstance(getattr(targets, "targets", None), np.ndarray):
+            raise ParameterError("targets", targets, "the positions or poses of the path: its .targets")
         rows = finite_array("targets", targets, None, "m")
         if len(rows) == 0 or rows.shape[1:] not in ((3,), (4, 4)):
             requirement = "at least one target position, shape (n, 3), or pose, shape (n, 4, 4) [m]"

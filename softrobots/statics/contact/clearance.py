@@ -8,11 +8,13 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import ParameterError
+from softrobots.core.summary import summarised
 from softrobots.environment.environment import Environment, fixed_environment
 from softrobots.environment.gaps import Surroundings
 from softrobots.model.soft_model import SoftModel
 
 
+@summarised
 class Clearance(NamedTuple):
     """The smallest gap between a robot and obstacles, and where it is; points in world axes."""
 
