@@ -229,3 +229,23 @@ def test_help_tells_every_field_with_its_unit(kind: Any) -> None:
             assert " ".join(entry.split()).startswith(" ".join(text.split())[:60])
     for name in getattr(kind, "_fields", ()):
         assert f" {name}: " in shown
+
+
+def test_help_has_no_private_fields() -> None:
+    for kind in (*ROBOTS, sr.SoftModel):
+        assert not re.search(r"^ *_\w+:", kind.__doc__.partition("Attributes:")[2], re.M)
+
+
+def test_a_probe_that_has_to_pull_says_so(arm: sr.SoftModel) -> None:
+    for displacement, told in ((0.01, "no"), (-0.01, "YES: what the robot only touches cannot")):
+        found = sr.solve_imposed_displacement(arm, (0, 0.3, 0), displacement, direction=(0, 0, 1))
+        assert found.pulls == (told != "no")
+        assert re.search(rf"the probe has to pull +{told}$", found.summary(), re.M)
+
+
+def test_a_force_that_is_estimated_as_none_is_printed_as_none(arm: sr.SoftModel) -> None:
+    """Rounding of a solution, 1e-11 N, is no force."""
+    held = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), (0, 0, -5), gravity=sr.EARTH_GRAVITY)
+    found = sr.estimate_load(arm, held.q_motors, held.motor_torques, gravity=sr.EARTH_GRAVITY)
+    assert re.search(r"^force on tip +0  0  -5 N$", found.summary(), re.M)
+    assert re.search(r"^load on tip +force 0  0  -5 N$", found.summary(), re.M)

@@ -56,7 +56,7 @@ class _ClassText:
             return self._text
         fields, texts = getattr(cls, "__dataclass_fields__", {}), field_texts(cls)
         lines = []
-        for name in fields or vars(cls)["_fields"]:
+        for name in (one for one in fields or vars(cls)["_fields"] if not one.startswith("_")):
             default = getattr(fields.get(name), "default", dataclasses.MISSING)
             told = "" if default is dataclasses.MISSING else f" Default: {default!r}."
             text = textwrap.indent(f"{name}: {texts.get(name, '')}{told}", " " * 8).strip()

@@ -103,6 +103,11 @@ def html_of(parts: Iterable[Part]) -> str:
     return f"<div>{''.join(blocks)}</div>"
 
 
+def force_text(force: Any) -> str:
+    """Return a force [N] with six digits and its unit; less than a nanonewton is rounding, and zero."""
+    return f"{formatted(np.round(force, 9))} N"
+
+
 def formatted(value: Any) -> str:
     """Return numbers with six digits, truth values as yes or no, None and infinity as none, text as it is."""
     value = value.item() if isinstance(value, np.ndarray | np.generic) and value.ndim == 0 else value

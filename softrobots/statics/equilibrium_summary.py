@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.summary import Part, Table, facts, formatted
+from softrobots.core.summary import Part, Table, facts, force_text, formatted
 from softrobots.model.actuators import load_units
 from softrobots.model.link_limits import slack_words
 from softrobots.model.soft_model import SoftModel
@@ -91,7 +91,7 @@ def loaded_robot(model: SoftModel, load: Load) -> Table:
     for frame, wrench in load.wrenches.items():
         if wrench.any():
             moment = f", moment {formatted(wrench[3:])} N m" if wrench[3:].any() else ""
-            rows.append((f"load on {frame}", f"force {formatted(wrench[:3])} N{moment}"))
+            rows.append((f"load on {frame}", f"force {force_text(wrench[:3])}{moment}"))
     gravity = "none" if load.gravity is None else f"{formatted(np.array(load.gravity))} m/s^2"
     hinges = max((group.n_hinges for group in model.spring_groups), default=1)
     robot = ("robot", f"{model.pinocchio.name}{f', {hinges} hinges a link' if hinges > 1 else ''} (tip: {model.tip})")

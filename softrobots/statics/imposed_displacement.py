@@ -63,7 +63,8 @@ class ImposedDisplacement(Summarised):
         """Return the equilibrium, then what the probe does."""
         held = ("stable at this place", "yes, certified" if self.stable else "NO")
         probe = field_facts(self, "displacement", "reaction", "force", "contact", "gap")
-        return [*self.equilibrium.summary_parts(), facts([*probe, held])]
+        pulling = ("the probe has to pull", "YES: what the robot only touches cannot" if self.pulls else "no")
+        return [*self.equilibrium.summary_parts(), facts([*probe, pulling, held])]
 
     @property
     def model(self) -> SoftModel:

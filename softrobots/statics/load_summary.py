@@ -7,13 +7,13 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.summary import Part, facts, formatted
+from softrobots.core.summary import Part, facts, force_text, formatted
 from softrobots.model.actuators import joined_units, load_units
 
 
 def load_parts(estimate: Any) -> list[Part]:
     """Return the parts of the summary of a `LoadEstimate`."""
-    rows = [(f"force on {estimate.frame}", f"{formatted(estimate.force)} N")]
+    rows = [(f"force on {estimate.frame}", force_text(estimate.force))]
     if estimate.force_std is not None:
         rows.append(("  standard deviation", f"{formatted(estimate.force_std)} N"))
     if len(estimate.covariance_parts) > 1:
