@@ -14,7 +14,8 @@ from softrobots.view.legend import LegendEntry
 from softrobots.view.meshcat_page.page_commands import packed
 from softrobots.view.meshcat_page.page_text import legend_rows
 
-_SCRIPTS = ("scene.js", "page.js")
+_SCENE = ("shapes", "surroundings", "camera", "arrow", "robot_scene")
+_PAGE = ("solutions", "showing", "status", "controls", "dragging", "turning", "state", "api", "loop")
 
 
 def interactive_text(data: dict[str, Any], solver: str, title: str, actuators: str, legend: Sequence[LegendEntry]) -> str:
@@ -28,7 +29,7 @@ def interactive_text(data: dict[str, Any], solver: str, title: str, actuators: s
         legend: Colour and meaning of what is drawn.
     """
     robot = f"const PAGE_DATA = {json.dumps(json.dumps(data, separators=(',', ':'), allow_nan=False))};\n"
-    scripts = [robot, solver, *(_file(name) for name in _SCRIPTS)]
+    scripts = [robot, solver, _start_page()]
     values = {
         "title": html.escape(title),
         "actuators": actuators,
@@ -39,6 +40,12 @@ def interactive_text(data: dict[str, Any], solver: str, title: str, actuators: s
         "version": __version__,
     }
     return Template(_file("page.html")).substitute(values)
+
+
+def _start_page() -> str:
+    """The function that starts the page: the files beside this module, one behind the other, share its names."""
+    pieces = [_file(f"{name}.js") for name in (*_SCENE, *_PAGE)]
+    return "\n".join(["function startPage() {", '"use strict";', *pieces, "return window.softrobots;", "}"])
 
 
 def _three() -> str:
