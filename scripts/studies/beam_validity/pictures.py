@@ -20,8 +20,8 @@ from studies.beam_validity.tables import row_at
 
 def link_figure(link: Mapping[str, Any]) -> Any:
     """Draw the validity region, the stiffness over pressure, and the differences over the load at the pressure of the arm."""
-    drawn = canvas.new_figure((12.0, 9.0))
-    (region, stiffness), below = drawn.subplots(2, 2)
+    drawn = canvas.new_figure((canvas.WIDTH, 15.0))
+    region, stiffness, *below = drawn.subplots(4, 1)
     rows, loads = link["rows"], np.array(link["loads_N"])
     pressures = 1e-3 * np.array([row["pressure_Pa"] for row in rows])
     wrinkling = np.array([row["wrinkles_at_N"] for row in rows])
@@ -62,15 +62,14 @@ def link_figure(link: Mapping[str, Any]) -> Any:
         axes.set_xlim(0.0, loads[-1])
     for axes in (region, stiffness, *below):
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=8, loc="lower right" if axes is stiffness else "best")
+        axes.legend(fontsize=canvas.SMALL, loc="lower right" if axes is stiffness else "best")
     return drawn
 
 
 def arm_figure(rods: ModuleType, arm: Mapping[str, Any], errors: Mapping[str, Mapping[str, np.ndarray]]) -> Any:
     """Draw one posture, and how the errors are distributed."""
-    drawn = canvas.new_figure((12.0, 9.0))
-    panels = drawn.subplots(2, 2)
-    shape, others = panels[0, 0], panels.ravel()[1:]
+    drawn = canvas.new_figure((canvas.WIDTH, 15.0))
+    shape, *others = panels = drawn.subplots(4, 1)
     rod, case = arm_rod(rods).planar(), Case(np.array([0.0, 0.7, -1.0]), np.array([0.0, 0.0, -15.0]))
     line_of = beams(rods, rod, case).shape
     shape.plot(line_of[:, 0], line_of[:, 2], color="black", lw=3.0, label="two beams")
@@ -100,7 +99,6 @@ def arm_figure(rods: ModuleType, arm: Mapping[str, Any], errors: Mapping[str, Ma
         title = f"{label.partition(' [')[0].capitalize()} against beams that {kind}"
         axes.set(xlabel=label, ylabel="share of the cases [%]", title=title)
         axes.set_xlim(0.0, None)
-    for axes in panels.ravel():
-        axes.grid(alpha=0.3)
-        axes.legend(fontsize=8)
+    for axes in panels:
+        canvas.grid_and_legend(axes)
     return drawn

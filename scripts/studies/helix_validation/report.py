@@ -43,8 +43,8 @@ def csv_of(rows: list[Row]) -> str:
 
 def figure(rows: list[Row], tolerance: float) -> Any:
     """Draw the committed tube with the frames of its chain on the analytic helix, and the errors of all tubes."""
-    figure = canvas.new_figure((12.0, 6.2))
-    grid_ = figure.add_gridspec(1, 2, width_ratios=(1.0, 1.2))
+    figure = canvas.new_figure((canvas.WIDTH, 11.0))
+    grid_ = figure.add_gridspec(2, 1, height_ratios=(1.4, 1.0))
     _draw_chain(figure.add_subplot(grid_[0], projection="3d"))
     axes = figure.add_subplot(grid_[1])
     groups = list(dict.fromkeys(row.case.group for row in rows))
@@ -72,7 +72,7 @@ def figure(rows: list[Row], tolerance: float) -> Any:
     axes.set_title("Chains against the closed form")
     axes.set_xticks([])
     axes.grid(alpha=0.3, axis="y")
-    axes.legend(fontsize=8, ncols=2, loc="upper right")
+    axes.legend(fontsize=canvas.SMALL, ncols=2, loc="upper right")
     return figure
 
 
@@ -103,10 +103,10 @@ def _draw_chain(axes: Any) -> None:
     low, high = corners.min(axis=0), corners.max(axis=0)
     for axis, a, b in zip("xyz", low, high, strict=True):
         getattr(axes, f"set_{axis}lim")(a, b)
-    axes.set_box_aspect(high - low, zoom=0.92)
+    axes.set_box_aspect(high - low, zoom=1.1)
     axes.view_init(elev=18, azim=-68)
     axes.set_xticks([0.0, 0.1])
     axes.locator_params(axis="z", nbins=5)
     axes.yaxis.labelpad = axes.zaxis.labelpad = 9.0
     axes.set(xlabel="x [m]", ylabel="y [m]", zlabel="z [m]", title="Committed chains on the helix")
-    axes.legend(fontsize=8, loc="upper left")
+    axes.legend(fontsize=canvas.SMALL, loc="upper center", bbox_to_anchor=(0.5, -0.08))

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots import inflated_beam
-from softrobots.view.figures.canvas import COLOURS, MARKERS, new_figure
+from softrobots.view.figures.canvas import COLOURS, MARKERS, WIDTH, grid_and_legend, new_figure
 from studies.ur5.bench_run import BenchRun, Measurement
 
 Push = tuple[inflated_beam.CharacterisationRow, BenchRun, Measurement]
@@ -27,7 +27,7 @@ def force_displacement(pushes: Sequence[Push]) -> Any:
     Raises:
         MissingDependency: If matplotlib is not installed.
     """
-    figure = new_figure((8.0, 5.0))
+    figure = new_figure((WIDTH, 4.8))
     axes = figure.add_subplot()
     for number, (row, run, measured) in enumerate(pushes):
         colour = COLOURS[number % len(COLOURS)]
@@ -41,8 +41,7 @@ def force_displacement(pushes: Sequence[Push]) -> Any:
         title="Force of the link on the probe (points: load cell, lines: statics)",
     )  # fmt: skip
     axes.set_ylim(0.0, None)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=9)
+    grid_and_legend(axes)
     return figure
 
 
@@ -59,7 +58,7 @@ def moment_angle(pushes: Sequence[Push]) -> Any:
         MissingDependency: If matplotlib is not installed.
         ParameterError: If a law cannot be fitted.
     """
-    figure = new_figure((8.0, 5.6))
+    figure = new_figure((WIDTH, 5.4))
     axes, ends = figure.add_subplot(), []
     for number, (row, run, measured) in enumerate(pushes):
         colour = COLOURS[number % len(COLOURS)]
@@ -83,6 +82,5 @@ def moment_angle(pushes: Sequence[Push]) -> Any:
     axes.set(xlabel="hinge angle [rad]", ylabel="moment at the hinge [N m]", title="Moment-angle law of the link")
     axes.set_xlim(0.0, None)
     axes.set_ylim(0.0, None)
-    axes.grid(alpha=0.3)
-    axes.legend(fontsize=9, ncols=2, loc="lower right", framealpha=1.0)
+    grid_and_legend(axes, ncols=2, loc="lower right", framealpha=1.0)
     return figure

@@ -147,5 +147,5 @@ def force_arrow(axes: Any, equilibrium: Equilibrium) -> FloatArray:
         return np.zeros((0, 3))
     size = float(np.linalg.norm(wrench[:3]))
     arrow = 0.2 * equilibrium.model.reach * wrench[:3] / size
-    axes.quiver(*tip, *arrow, color=COLOURS[2], lw=2.0, label=f"force, {size:.1f} N")
+    axes.quiver(*tip, *arrow, color=COLOURS[2], lw=2.0, label=f"force {size:.3g} N")
     return np.asarray(tip + arrow)[None]
