@@ -160,6 +160,10 @@ def test_sliders_numbers_and_gravity_change_what_is_shown(
     for state in (raised, pulled, heavy):
         expected = sr.solve_equilibrium(models["arm"], state["motors"], state["force"], gravity=state["gravity"])
         np.testing.assert_allclose(state["drawnTip"], expected.tip_position, rtol=0, atol=1e-9)
+    assert page.get_by_text("beyond its limits").count() == 0
+    page.get_by_role("spinbutton", name="motor_1").fill("17")
+    tab.shown(lambda shown: shown["motors"][0] == 17)
+    assert page.get_by_text("974° beyond its limits").count() == 1
     page.get_by_role("button", name="Reset").click()
     tab.shown(lambda shown: shown["force"] == [0, 10, -15] and shown["gravity"] is None and shown["motors"] == [0.3, 0.6, -0.8])
 

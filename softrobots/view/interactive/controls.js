@@ -1,5 +1,5 @@
 // Sliders, each a range and a field of numbers, and the choice of gravity.
-function slider(parent, { name, unit, low, high, step }, read, write) {
+function slider(parent, { name, unit, low, high, step, lower, upper }, read, write) {
   const row = document.createElement("div"),
     label = document.createElement("span"),
     small = document.createElement("small");
@@ -43,6 +43,9 @@ function slider(parent, { name, unit, low, high, step }, read, write) {
         : unit === "m" && Math.abs(high) < 2
           ? `${(1000 * value).toFixed(1)} mm`
           : "";
+    const beyond = value < (lower ?? -Infinity) - 1e-9 || value > (upper ?? Infinity) + 1e-9;
+    if (beyond) small.textContent += " beyond its limits";
+    small.classList.toggle("beyond", beyond);
   };
 }
 
