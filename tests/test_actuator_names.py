@@ -130,7 +130,7 @@ def test_every_refusal_tells_all_seventeen_actuators() -> None:
     [
         ({"motor_1": [1.0, 2.0], "motor_2": [1.0, 2.0, 3.0], "motor_3": 0.0}, "as many for one as for another"),
         ({"motor_1": [1.0, 2.0], "motor_2": 0.0, "motor_3": 0.0}, "(it has shape (2, 3))"),
-        ({"motor_1": "1", "motor_2": 0.0, "motor_3": 0.0}, "finite numbers"),
+        ({"motor_1": "1", "motor_2": 0.0, "motor_3": 0.0}, "motor_1'] must be a number: motor_1 [rad]"),
         ({0: 0.1, 1: 0.2, 2: 0.3}, "no actuator is called"),
         ({}, "motor_1, motor_2, motor_3 missing"),
     ],

@@ -236,7 +236,7 @@ def test_gravities_take_turns_in_one_workspace(arm: sr.SoftModel, rng: np.random
         ("<robot", {}, sr.DescriptionError, "not well-formed"),
         ("no_such_file.urdf", {}, sr.DescriptionError, "cannot read 'no_such_file.urdf'"),
         (42, {}, sr.ParameterError, "a robot, a path, or URDF text"),
-        (sr.InflatableArm, {}, sr.ParameterError, "a robot, a path, or URDF text"),
+        (sr.InflatableArm, {}, sr.ParameterError, r"a robot, not its class: InflatableArm\(\)"),
         (
             BRANCHED.replace('lower="-2"', 'lower="3"'),
             {"springs": {}, "tip": "finger"},
