@@ -133,6 +133,8 @@ def test_the_command_asks_in_one_line_and_refuses_centimetres(capsys: pytest.Cap
         (lambda: sr.follow_trajectory(ARM, sr.straight_line((0.9, -0.3, 0.2), (0.9, 0.3, 0.2), 2.0, 20)), "its .targets"),
         (lambda: sr.identify(sr.InflatableArm(), [1, 2], ("stiffness",)), "Measurements.from_csv"),
         (lambda: sr.solve_ik(ARM, (90, 30, 20)), "; its reach is 1.2 m"),
+        (lambda: sr.plot(sr.linearize(ARM, sr.solve_equilibrium(ARM, (0, 0, 0)))), "softrobots.view.figures draws others"),
+        (lambda: sr.load_model(BRANCHED), "--spring JOINT=STIFFNESS"),
     ],
 )
 def test_errors_tell_the_cure_of_common_mistakes(call: Callable[[], Any], text: str) -> None:

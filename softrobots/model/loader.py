@@ -85,7 +85,8 @@ def load_model(
     if springs is None and not spring_tags and not tags.sections:
         raise DescriptionError(
             f"{label} has no joint springs; give springs={{joint: stiffness}} for its movable joints "
-            f"({', '.join(movable) or 'none'}), or springs={{}} for a rigid robot"
+            f"({', '.join(movable) or 'none'}), or springs={{}} for a rigid robot; "
+            "in commands --spring JOINT=STIFFNESS"
         )
     stray = [name for name in (*spring_tags, *in_sections) if name not in movable]
     if stray:

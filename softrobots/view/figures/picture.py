@@ -74,7 +74,7 @@ def plot(result: Drawable, *, title: str | None = None) -> Any:
     """
     if not isinstance(result, Drawable):
         wanted = "an Equilibrium or what holds one, a SoftModel, a Trajectory, a ContactPath or a Motion"
-        raise ParameterError("result", result, wanted)
+        raise ParameterError("result", result, f"{wanted}; softrobots.view.figures draws others")
     state = result.equilibrium if isinstance(result, IkSolution | ImposedDisplacement | LoadEstimate) else result
     state = state.equilibria[-1] if isinstance(state, Trajectory | ContactPath) else state
     model = state if isinstance(state, SoftModel) else state.model
