@@ -79,6 +79,7 @@ def test_the_whole_robot_is_in_every_window(
     for size in WINDOWS:
         page = opened(browser, file, size)
         places = np.array(page.evaluate(ON_SCREEN))
+        assert page.get_by_text("force", exact=False).first.is_visible() == (size[0] > 640)  # a legend folds on a phone
         page.close()
         assert np.abs(places).max() <= 1.0, size
         assert np.max(places[2:] - places[:2]) > 0.4, size
