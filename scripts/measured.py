@@ -1,8 +1,8 @@
 """Compare models of the package with measurements that others have published.
 
 Each comparison has its measurements, with source and licence, in docs/examples or in the package, predicts them with the
-robots of the package, and tells the errors: an inflated link, tubes of kites, a long boom. The tendon-driven arm has scripts
-of its own, measured_arm.py and measured_arm_fit.py.
+robots of the package, and tells the errors: an inflated link, tubes of kites, a long boom, a fly rod. The tendon-driven arm
+has scripts of its own, measured_arm.py and measured_arm_fit.py.
 
 Prints Markdown tables; under a minute for all.
 """
@@ -21,6 +21,7 @@ from softrobots.core.files import make_folder, write_text
 from softrobots.view.figures import canvas
 from studies.measured.boom import BOOM
 from studies.measured.comparison import Comparison, overview_table
+from studies.measured.fly_rod import FLY_ROD
 from studies.measured.inflated_link import INFLATED_LINK
 from studies.measured.kite_tubes import KITE_TUBES
 from studies.measured.recorded_arm import arm_rows, read_record
@@ -30,7 +31,12 @@ from studies.shared.markdown import marked
 from studies.shared.recorded_run import check_page, write_record
 
 PAGE = "measured.md"
-COMPARISONS: dict[str, Comparison] = {"inflated_link": INFLATED_LINK, "kite_tubes": KITE_TUBES, "boom": BOOM}
+COMPARISONS: dict[str, Comparison] = {
+    "inflated_link": INFLATED_LINK,
+    "kite_tubes": KITE_TUBES,
+    "boom": BOOM,
+    "fly_rod": FLY_ROD,
+}
 """By name, in the order of the page."""
 BEGIN, END = "<!-- measured_overview:begin -->", "<!-- measured_overview:end -->"
 
