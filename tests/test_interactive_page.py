@@ -136,6 +136,9 @@ def test_the_page_solves_and_draws_what_python_solves(
             points = np.concatenate([segment.backbone for segment in body(expected)])
             for ring in np.concatenate(drawn["rings"]):  # corners are numbers of 32 bits
                 assert np.linalg.norm(points - ring, axis=1).min() < 3e-7
+        words = tab.page.locator("#motors .row > span:first-child").all_inner_texts()[-len(expected.muscle_forces) or None :]
+        for row, tension, slack in zip(words, expected.muscle_forces, expected.muscle_slack, strict=False):
+            assert ("slack" if slack else f"{'pulls' if tension > 0 else 'pushes'} {abs(tension):.3g} N") in row
         margins = expected.link_limits.wrinkling_margins
         if len(margins):
             shown = [int(number) for number in re.findall(r"(-?\d+) % left", drawn["words"])]

@@ -116,7 +116,7 @@ def _legend(model: SoftModel, data: dict[str, Any]) -> list[LegendEntry]:
     entries = [LegendEntry(RIGID_COLOUR, "the robot at rest")] * any(solid["elastic"] for solid in data["solids"])
     entries += [LegendEntry(TUBE_COLOUR, "body")] * any(tube["link"] is None for tube in data["tubes"])
     lines = [curve["name"] for curve in data["curves"] if curve["name"] not in {one["name"] for one in data["actuators"]}]
-    entries += [LegendEntry(LINE_COLOUR, name) for name in (*lines, *["actuators"] * (len(lines) < len(data["curves"])))]
+    entries += [LegendEntry(LINE_COLOUR, name) for name in lines]
     above = 1.0
     for least, colour in WRINKLING_COLOURS if model.spring_groups else ():
         words = f"{100 * least:.0f} - {100 * above:.0f} % left to wrinkling" if np.isfinite(least) else "wrinkled"

@@ -8,6 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from softrobots.compiled.browser.links import inflated_links
+from softrobots.compiled.browser.tensions import tension_places
+from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.program.shape_program import with_shape
@@ -50,6 +52,7 @@ def script(model: SoftModel, unknowns: Unknowns, program: Program, *, gravity: b
         "frames": shape.frames,
         "loadsPlace": shape.loads,
         "strains": len(unknowns.chain.rest),
+        "tensions": tension_places(Plan(unknowns, gravity)),
         "links": inflated_links(model, unknowns.chain, shape.frames),
         "consistent": CONSISTENT,
         "misfit": _misfit(unknowns.chain),

@@ -78,6 +78,16 @@ function limitsOf(loads, strains, placements, force, gravity) {
   });
 }
 
+// Tension of each muscle at the point that was evaluated last.
+function tensionsOf(w) {
+  const { place, sums, shares } = ROBOT.tensions;
+  if (sums === null) {
+    return Array.from(w.subarray(place, place + ROBOT.muscles));
+  }
+  const loads = sums.map((sum, k) => w[place + k] - sum.stiffness * (w[$START + sum.unknown] - sum.rest));
+  return shares.map((row) => row.reduce((total, share, k) => total + share * loads[k], 0.0));
+}
+
 function makeSolver() {
   const w = new Float64Array(ROBOT.size);
   const units = [...new Set(ROBOT.actuators.map((one) => one.unit))].join(", ");
@@ -143,6 +153,7 @@ function makeSolver() {
       minPivot: w[$MIN_PIVOT],
       placements,
       links,
+      tensions: tensionsOf(w),
       unknowns,
       start: w.slice($START, $START + ROBOT.unknowns),
     };

@@ -119,8 +119,9 @@ class CompiledStatics:
         `residual` [N m], `minPivot` (the smallest pivot of the tangent stiffness, by its spring's own) and `placements`: for
         each of `frames` a rotation matrix, row by row, and a position [m] in the world. Frames are those of joints,
         Pinocchio's, of points along sections at a share of their length, and the tip. `links` has for each inflated link
-        `{name, moment, axialForce, slackMargin, wrinklingMargin}` as `Equilibrium.link_limits`. Other numbers than finite ones
-        throw a TypeError. With the status `NOT_A_NUMBER` the other numbers mean nothing.
+        `{name, moment, axialForce, slackMargin, wrinklingMargin}` as `Equilibrium.link_limits`, and `tensions` [N] are
+        those of `Equilibrium.muscle_forces`. Other numbers than finite ones throw a TypeError. With the status `NOT_A_NUMBER`
+        the other numbers mean nothing.
 
         Args:
             gravity: Write the code for robots with weight; it solves weightless ones, too.

@@ -20,6 +20,7 @@ from softrobots.view.mesh_triangles import triangles
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.scene import WRINKLING_COLOURS, SceneBuilder
 from softrobots.view.slider_ranges import actuator_ends, slider_grid
+from softrobots.view.tension_scale import PULL_COLOURS, PUSH_COLOURS, ZERO_COLOUR
 
 POINTS = 12
 """Frames along each section, the last at its end."""
@@ -86,6 +87,7 @@ def robot_data(unloaded: Equilibrium, full_force: float) -> dict[str, Any]:
             | dict(zip(("low", "high", "step"), slider_grid(*ends), strict=True))
             for name, unit, (low, high), relaxed_at, ends in rows
         ],
+        "elastic": [tag.kind == "elastic" for tag in model.muscles],
         "basis": None if model.actuators.independent else model.actuators.basis.tolist(),
         "earth": list(EARTH_GRAVITY),
         "fullForce": full_force,
@@ -107,6 +109,9 @@ def robot_data(unloaded: Equilibrium, full_force: float) -> dict[str, Any]:
             "rigid": appearance.RIGID_COLOUR,
             "tube": appearance.TUBE_COLOUR,
             "line": appearance.LINE_COLOUR,
+            "pull": PULL_COLOURS,
+            "push": PUSH_COLOURS,
+            "zero": ZERO_COLOUR,
             "force": appearance.FORCE_COLOUR,
             "floor": appearance.FLOOR_COLOUR,
         },

@@ -37,15 +37,24 @@ class Tube {
         new THREE.BufferAttribute(new Float32Array(3 * corners), 3).setUsage(THREE.DynamicDrawUsage),
       );
     }
-    this.geometry.setIndex(this.triangles());
+    this.dash(false);
     this.mesh = new THREE.Mesh(this.geometry, material);
     this.mesh.frustumCulled = false;
   }
 
-  triangles() {
+  // About two dozen dashes along the tube, or one piece.
+  dash(dashed) {
+    if (dashed === this.dashed) return;
+    this.dashed = dashed;
+    this.geometry.setIndex(this.triangles(dashed ? Math.max(1, Math.round(this.rings / 47)) : Infinity));
+  }
+
+  // long: rings from gap to gap
+  triangles(long) {
     const index = [],
       { rings, sides } = this;
     for (let ring = 0; ring + 1 < rings; ring++) {
+      if (Math.floor(ring / long) % 2) continue;
       for (let side = 0; side < sides; side++) {
         const a = ring * sides + side,
           b = ring * sides + ((side + 1) % sides);

@@ -24,6 +24,7 @@ function draw() {
     force: shownFor.force,
     levels: shares(shown).map(level),
   });
+  showTensions(shown);
   $("canvas").classList.toggle("failed", failed !== "");
 }
 

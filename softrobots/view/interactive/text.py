@@ -15,7 +15,7 @@ from softrobots.view.meshcat_page.page_commands import packed
 from softrobots.view.meshcat_page.page_text import legend_rows
 
 _SCENE = ("shapes", "surroundings", "camera", "arrow", "robot_scene")
-_PAGE = ("solutions", "showing", "status", "controls", "dragging", "turning", "state", "api", "loop")
+_PAGE = ("solutions", "showing", "status", "controls", "tensions", "dragging", "turning", "state", "api", "loop")
 
 
 def interactive_text(data: dict[str, Any], solver: str, title: str, actuators: str, legend: Sequence[LegendEntry]) -> str:
