@@ -146,6 +146,18 @@ def test_the_page_solves_and_draws_what_python_solves(
             np.testing.assert_allclose(shown, 100 * np.array(wanted), atol=0.51)
 
 
+def test_a_wrinkled_link_is_told_beside_the_certificate(open_tab: Callable[..., Tab], models: dict[str, sr.SoftModel]) -> None:
+    """Stable, but the springs of a wrinkled link are softer than the model's: the badge is not the green one."""
+    tab = open_tab("arm")
+    case = {"motors": [0.3, 0.6, -0.8], "force": [0, 12, -18]}
+    assert sr.solve_equilibrium(models["arm"], case["motors"], case["force"]).wrinkled
+    told = "() => { const box = document.getElementById('status'); return [box.className, box.innerText.trim()]; }"
+    assert [link["name"] for link in tab.run("given => softrobots.set(given).links", case)] == ["link 1", "link 2"]
+    assert tab.run(told) == ["neutral", "certified stable, but wrinkled"]
+    tab.run("given => { softrobots.set(given); }", case | {"force": [0, 10, -15]})
+    assert tab.run(told) == ["good", "certified stable"]
+
+
 def test_sliders_numbers_and_gravity_change_what_is_shown(
     open_tab: Callable[..., Tab], models: dict[str, sr.SoftModel]
 ) -> None:

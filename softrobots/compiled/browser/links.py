@@ -22,15 +22,15 @@ def inflated_links(model: SoftModel, chain: SerialChain, frames: list[dict[str, 
     }
     joints = {one.name: (row, one) for row, one in enumerate(chain.elements) if isinstance(one, ChainJoint)}
     links = []
-    for group in model.spring_groups:
+    for number, group in enumerate(model.spring_groups, start=1):
         names = [[model.spring_joints[place] for place in hinge] for hinge in group.hinges]
-        link: dict[str, Any] = {"pressure": group.pressure, "radius": group.radius, "segment": group.segment}
+        name = f"{'link' if group.segment is None else 'section'} {number}"
+        link: dict[str, Any] = {"name": name, "pressure": group.pressure, "radius": group.radius, "segment": group.segment}
         if names[0][0] in of_section:
-            link["name"] = section = of_section[names[0][0]][0]
+            section = of_section[names[0][0]][0]
             link |= {"strains": [[of_section[one][1] for one in hinge] for hinge in names]}
             link |= {"hinges": None, "stretch": of_section[f"{section}_stretch"][1]}
         else:
-            link["name"] = names[0][0]
             link |= {"strains": [[joints[one][1].strain for one in hinge] for hinge in names], "stretch": None}
             link["hinges"] = [_hinge(chain, sorted(joints[one][0] for one in hinge), places) for hinge in names]
         links.append(link)

@@ -100,10 +100,6 @@ def robot_data(unloaded: Equilibrium, full_force: float) -> dict[str, Any]:
         "solids": _solids(scenes.robot, relaxed.deformed, model, frames),
         "tubes": _tubes(model, frames),
         "curves": _curves(model, sections, frames),
-        "links": [
-            f"{'link' if group.segment is None else 'section'} {number}"
-            for number, group in enumerate(model.spring_groups, start=1)
-        ],
         "colours": {
             "wrinkling": [[least if math.isfinite(least) else -1e9, rgb] for least, rgb in WRINKLING_COLOURS],
             "rigid": appearance.RIGID_COLOUR,

@@ -9,9 +9,10 @@ const short = (value) =>
 
 function report(found) {
   const box = $("status"),
-    state = found.status === 0 ? "good" : found.status === 8 ? "neutral" : "bad";
+    wrinkled = found.status === 0 && found.links.some((link) => link.wrinklingMargin <= 0),
+    state = found.status === 8 || wrinkled ? "neutral" : found.status === 0 ? "good" : "bad";
   box.className = state;
-  box.children[1].textContent = found.statusText;
+  box.children[1].textContent = wrinkled ? `${found.statusText}, but wrinkled` : found.statusText;
   box.children[2].textContent = state === "bad" ? "the last certified pose stays" : "";
   const [x, y, z] = (shown ?? found).tip.map((one) => one.toFixed(4).replace("-", "\u2212"));
   const rows = [
@@ -46,7 +47,7 @@ function report(found) {
 
 function told(links) {
   // each link, or of many the nearest to wrinkling
-  const rows = links.map((link, number) => [link.wrinklingMargin, data.links[number]]);
+  const rows = links.map((link) => [link.wrinklingMargin, link.name]);
   if (rows.length <= 4) return rows;
   const [share, name] = rows.reduce((least, row) => (row[0] < least[0] ? row : least));
   return [[share, `${name}, the nearest of ${rows.length}`]];
