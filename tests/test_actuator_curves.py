@@ -179,6 +179,7 @@ def test_what_is_drawn_has_the_colours_and_the_words_of_the_legend() -> None:
         assert (blue > red) == (force > 0.0)
 
 
+@pytest.mark.study
 def test_slack_tendons_are_dashed_on_pages_and_in_figures() -> None:
     """Those without tension in the balance, and no others."""
     arm = sr.load_model(sr.TendonArm(elastic_sections=2))

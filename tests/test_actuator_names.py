@@ -83,6 +83,7 @@ COMPILED: dict[str, Callable[[Any, Any], Any]] = {
 }
 
 
+@pytest.mark.study
 @each_row("call", COMPILED)
 def test_compiled_solvers_take_names(call: str) -> None:
     solver = sr.compile(ARM, backend="python")

@@ -355,6 +355,7 @@ def test_pages_are_small_and_the_same_again(arm: sr.SoftModel, tmp_path: Path) -
     assert not (tmp_path / "no.html").exists()
 
 
+@pytest.mark.study
 def test_pages_of_long_robots_are_small(files: dict[str, Path]) -> None:
     assert max(file.stat().st_size for file in files.values()) < 2_500_000
 
