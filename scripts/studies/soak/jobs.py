@@ -24,7 +24,7 @@ from studies.soak.families import Family
 from studies.soak.plain_statics import Case, PlainStatics
 
 SECONDS = 30.0
-"""A call that takes more time of the processor counts as a hang [s]."""
+"""A call that takes longer counts as a hang [s]."""
 
 STABLE, UNSTABLE = "stable", "not stable"
 """Outcomes: certified stable, or in equilibrium and reported as not stable."""
@@ -66,18 +66,18 @@ class Hang(BaseException):
 
 @contextmanager
 def limited(seconds: float) -> Iterator[None]:
-    """Interrupt a block that takes too much time of the processor; main thread only."""
+    """Interrupt a block that takes too long; main thread only."""
 
     def stop(number: int, frame: Any) -> None:
         raise Hang
 
-    before = signal.signal(signal.SIGPROF, stop)
-    signal.setitimer(signal.ITIMER_PROF, seconds)
+    before = signal.signal(signal.SIGALRM, stop)
+    signal.setitimer(signal.ITIMER_REAL, seconds)
     try:
         yield
     finally:
-        signal.setitimer(signal.ITIMER_PROF, 0.0)
-        signal.signal(signal.SIGPROF, before)
+        signal.setitimer(signal.ITIMER_REAL, 0.0)
+        signal.signal(signal.SIGALRM, before)
 
 
 def _answer(row: int, solve_case: Callable[[int], dict[str, Any]]) -> Answer:
