@@ -22,7 +22,7 @@ from tqdm import tqdm
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.core.files import make_folder, write_text
+from softrobots.core.files import make_folder, write_bytes, write_text
 from softrobots.view.figures import canvas
 from studies.helix_validation.comparison import measure, summary
 from studies.helix_validation.report import csv_of, figure, table
@@ -72,9 +72,9 @@ def run(arguments: argparse.Namespace) -> bool:
     files = [write_text(folder / NAMES[0], json.dumps(document, indent=2) + "\n", overwrite=False)]
     files.append(write_text(folder / NAMES[1], csv_of(rows), overwrite=False))
     if not arguments.no_plots:
-        drawing = figure(rows, arguments.tolerance)
-        for place, overwrite in ((folder, False), *([(arguments.docs, True)] if arguments.docs else [])):
-            files.append(canvas.write_png(drawing, place / NAMES[2], overwrite=overwrite))
+        files.append(canvas.write_png(figure(rows, arguments.tolerance), folder / NAMES[2], overwrite=False))
+        if arguments.docs:  # the same bytes: the layout of a figure moves when it is drawn again
+            files.append(write_bytes(arguments.docs / NAMES[2], files[-1].read_bytes(), overwrite=True))
     print(f"\nwritten: {', '.join(map(str, files))}")
     return passed
 
