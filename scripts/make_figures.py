@@ -22,7 +22,7 @@ from softrobots.core.progress import with_progress
 from softrobots.description.expansion import expand
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.view.browser import take_picture
-from softrobots.view.figures import canvas, equilibria, inflated_link, motions, vibrations
+from softrobots.view.figures import canvas, equilibria, inflated_link, vibrations
 from studies.contact.pictures import contact_grip, contact_margins, contact_peg_forces
 from studies.gallery.actuator_plots import actuator_kinds, dry_friction
 from studies.gallery.your_robot import (
@@ -33,7 +33,7 @@ from studies.gallery.your_robot import (
     your_robot_sets,
     your_robot_values,
 )
-from studies.motion import examples
+from studies.motion.pictures import motion_energies, motion_gust, motion_release, motion_tip, motion_turn
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 EXAMPLES = DOCS / "examples"
@@ -168,31 +168,6 @@ def finger_grip() -> Any:
         axes.grid(alpha=0.3)
         axes.legend(fontsize=9)
     return figure
-
-
-def motion_release() -> Any:
-    """The arm of docs/motion.md that is let go, over its first swing."""
-    return motions.strobe(examples.release(0.14), shown=7)
-
-
-def motion_tip() -> Any:
-    """Its tip over time."""
-    return motions.tip_over_time(examples.release())
-
-
-def motion_energies() -> Any:
-    """Its energies."""
-    return motions.energies(examples.release())
-
-
-def motion_turn() -> Any:
-    """The tip of the arm that turns fast, with and without shaping."""
-    return motions.tip_over_time(examples.turns())
-
-
-def motion_gust() -> Any:
-    """The helix in a gust."""
-    return motions.strobe(examples.gust(0.45), shown=7)
 
 
 def tool_arm() -> sr.Viewer:

@@ -58,8 +58,8 @@ class _ClassText:
         lines = []
         for name in (one for one in fields or vars(cls)["_fields"] if not one.startswith("_")):
             default = getattr(fields.get(name), "default", dataclasses.MISSING)
-            told = "" if default is dataclasses.MISSING else f" Default: {default!r}."
-            text = textwrap.indent(f"{name}: {texts.get(name, '')}{told}", " " * 8).strip()
+            default_text = "" if default is dataclasses.MISSING else f" Default: {default!r}."
+            text = textwrap.indent(f"{name}: {texts.get(name, '')}{default_text}", " " * 8).strip()
             lines.append(f"    {text}")
         return "\n".join([self._text, "", "Attributes:", *lines])
 

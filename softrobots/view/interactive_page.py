@@ -115,7 +115,7 @@ def _legend(model: SoftModel, data: dict[str, Any]) -> list[LegendEntry]:
     """Colour and meaning of what is drawn."""
     entries = [LegendEntry(RIGID_COLOUR, "the robot at rest")] * any(solid["elastic"] for solid in data["solids"])
     entries += [LegendEntry(TUBE_COLOUR, "body")] * any(tube["link"] is None for tube in data["tubes"])
-    lines = [curve["name"] for curve in data["curves"] if curve["name"] not in {one["name"] for one in data["actuators"]}]
+    lines = [curve["name"] for curve in data["curves"] if curve["name"] not in model.actuator_names]
     entries += [LegendEntry(LINE_COLOUR, name) for name in lines]
     above = 1.0
     for least, colour in WRINKLING_COLOURS if model.spring_groups else ():

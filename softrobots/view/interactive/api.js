@@ -12,11 +12,7 @@ function input(given) {
 Object.defineProperties(
   window.softrobots,
   Object.getOwnPropertyDescriptors({
-    robot: {
-      name: data.name,
-      actuators: actuators.map(({ name, unit, lower, upper, relaxed }) => ({ name, unit, lower, upper, relaxed })),
-      springs: solver.springs,
-    },
+    robot: { name: solver.name, actuators: solver.actuators, springs: solver.springs },
     solve: (given = {}) => answer({ motors: relaxed, ...input(given) }),
     set(given = {}) {
       show(given);

@@ -67,7 +67,7 @@ class ChainFrames:
 
 
 def robot_data(unloaded: Equilibrium, full_force: float) -> dict[str, Any]:
-    """Return a robot as plain data for JSON.
+    """Return what a page draws of a robot, and its sliders, as plain data for JSON; its actuators are told by the solver.
 
     Args:
         unloaded: The robot with relaxed actuators, without load: shapes are given as they are then, and the page, which solves
@@ -78,15 +78,8 @@ def robot_data(unloaded: Equilibrium, full_force: float) -> dict[str, Any]:
     scenes, sections = SceneBuilder(model), BentSections(model, unloaded.q_motors, unloaded.q_springs)
     extent, relaxed, frames = scenes.extent, scenes.loaded(unloaded), ChainFrames(model, chain, sections)
     eye, centre = extent.camera(extent.tip)
-    limits, units = model.motor_limits.tolist(), model.actuators.units
-    rows = zip(model.motor_joints, units, limits, model.relaxed_motors.tolist(), actuator_ends(model), strict=True)
     return {
-        "name": str(model.pinocchio.name),
-        "actuators": [
-            {"name": name, "unit": unit, "lower": _finite(low), "upper": _finite(high), "relaxed": relaxed_at}
-            | dict(zip(("low", "high", "step"), slider_grid(*ends), strict=True))
-            for name, unit, (low, high), relaxed_at, ends in rows
-        ],
+        "sliders": [dict(zip(("low", "high", "step"), slider_grid(*ends), strict=True)) for ends in actuator_ends(model)],
         "elastic": [tag.kind == "elastic" for tag in model.muscles],
         "basis": None if model.actuators.independent else model.actuators.basis.tolist(),
         "earth": list(EARTH_GRAVITY),
@@ -177,10 +170,6 @@ def _curves(model: SoftModel, sections: BentSections, frames: ChainFrames) -> li
         radius = THREAD * sections.radius(line.segment)
         curves.append({"name": line.name, "points": [[frame, *at] for frame in numbers], "radius": radius})
     return curves
-
-
-def _finite(number: float) -> float | None:
-    return number if math.isfinite(number) else None
 
 
 def _rounded(values: Any) -> list[float]:

@@ -2,7 +2,7 @@
 const data = JSON.parse(PAGE_DATA),
   solver = makeSolver(),
   $ = (id) => document.getElementById(id);
-const { actuators } = data,
+const actuators = solver.actuators.map((one, place) => ({ ...one, ...data.sliders[place] })),
   names = actuators.map((one) => one.name),
   relaxed = actuators.map((one) => one.relaxed);
 const wanted = {
@@ -16,12 +16,15 @@ let shown = null,
   rates = 0,
   asked = true;
 
-const good = (found) => found.status === 0 || found.status === 8;
+const [CERTIFIED, NOT_A_NUMBER, NEUTRAL] = ["CERTIFIED", "NOT_A_NUMBER", "NEUTRAL"].map((name) =>
+  solver.statuses.findIndex((status) => status.name === name),
+);
+const good = (found) => found.status === CERTIFIED || found.status === NEUTRAL;
 const plain = ({ motors, force, gravity }) => ({ motors, force, gravity: gravity ?? [0, 0, 0] });
 function answer(setting, from) {
   const found = solver.solve(from ? { ...setting, from } : setting);
   if (good(found) && ![...found.tip, ...found.placements].every(Number.isFinite))
-    return { ...found, status: 4, statusText: solver.statuses[4].text };
+    return { ...found, status: NOT_A_NUMBER, statusText: solver.statuses[NOT_A_NUMBER].text };
   return found;
 }
 

@@ -9,8 +9,8 @@ const short = (value) =>
 
 function report(found) {
   const box = $("status"),
-    wrinkled = found.status === 0 && found.links.some((link) => link.wrinklingMargin <= 0),
-    state = found.status === 8 || wrinkled ? "neutral" : found.status === 0 ? "good" : "bad";
+    wrinkled = found.status === CERTIFIED && found.links.some((link) => link.wrinklingMargin <= 0),
+    state = found.status === NEUTRAL || wrinkled ? "neutral" : found.status === CERTIFIED ? "good" : "bad";
   box.className = state;
   box.children[1].textContent = wrinkled ? `${found.statusText}, but wrinkled` : found.statusText;
   box.children[2].textContent = state === "bad" ? "the last certified pose stays" : "";
