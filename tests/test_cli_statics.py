@@ -15,6 +15,7 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
+from softrobots.cli.main import main, parser
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.statics.equilibrium_summary import stability_words
 from softrobots.statics.stability import Stability
@@ -674,6 +675,15 @@ def test_ik_jumps_only_if_told(told: Told, answer, tmp_path: Path) -> None:
     assert (status, out) == (1, "")
     assert "no continuous motion reaches it" in err
     assert max(answer(*words, "--allow-jumps")["tip_error"]) <= 1e-9
+
+
+def test_without_a_command_the_help_says_what_to_do_first(capsys: pytest.CaptureFixture[str]) -> None:
+    """Each of the three commands is one that can be read."""
+    with pytest.raises(SystemExit, match="2"):
+        main([])
+    shown = capsys.readouterr().out
+    commands = re.findall(r"^  softrobots (.+)$", shown, re.M)
+    assert [parser().parse_args(command.split()).command for command in commands] == ["urdf", "solve", "view"]
 
 
 # --- What is refused

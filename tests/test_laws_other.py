@@ -141,6 +141,7 @@ def test_an_error_crosses_to_another_process_as_it_is(text: str) -> None:
         *(kind(text, best=None, residual=0.1, iterations=3) for kind in unsolved),
         sr.ParameterError("radius", text, "positive"),
         sr.NameNotFound("frame", text, ("tip", "base")),
+        sr.FieldNotFound("field of InflatableArm", text, ("radius",)),
         sr.SelfIntersection(text, contact=None),
         sr.NoCriticalLoad(text, max_force=1.0),
         sr.MissingDependency(text, "plot"),

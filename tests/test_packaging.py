@@ -34,7 +34,7 @@ def test_importing_softrobots_imports_nothing_heavy() -> None:
 
 PUBLIC = """
 EARTH_GRAVITY PD ROBOTS AssumedStiffnessWarning Box Capsule ClosedLoop ClusterError ContactPath CrossValidation Cylinder
-DescriptionError Environment Equilibrium EquilibriumBranch EquilibriumNotFound FileFormatError HalfSpace HelixTube
+DescriptionError Environment Equilibrium EquilibriumBranch EquilibriumNotFound FieldNotFound FileFormatError HalfSpace HelixTube
 Identification IkSolution ImposedDisplacement InflatableArm InformativePoses InputShaper LinearModel LinkLimits LoadEstimate
 LoadNotFound Measurements Mesh MissingDependency Motion MotionState NameNotFound NeutralEquilibrium NoCriticalLoad NotConverged
 OutputError OutputExists ParameterError Path3D PccArm RingDown Route SelfIntersection Sensitivity ShapedTrajectory SoftModel

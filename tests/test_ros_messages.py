@@ -90,6 +90,12 @@ def test_a_state_has_the_positions_of_all_joints(robot: Any) -> None:
     data = chain.createData()
     pin.framesForwardKinematics(chain, data, np.array(message["position"]))
     assert np.abs(data.oMf[chain.getFrameId("tip")].translation - held.tip_position).max() < 1e-12
+    pull = pin.computeFrameJacobian(
+        chain, data, np.array(message["position"]), chain.getFrameId("tip"), pin.LOCAL_WORLD_ALIGNED
+    )
+    carried = dict(zip(message["name"], pull[:3].T @ (1.0, 2.0, -3.0), strict=True))
+    for name, effort in zip(message["name"], message["effort"], strict=True):  # motors balance the load, springs have none
+        assert effort == pytest.approx(-carried[name] if name in model.motor_joints else 0.0, abs=1e-12)
 
 
 def test_an_ik_solution_is_the_state_of_its_equilibrium_and_others_are_refused() -> None:
@@ -113,7 +119,14 @@ def read(file: Path, tool: Tool) -> dict[str, list[tuple[int, Any]]]:
     return found
 
 
-@pytest.mark.parametrize("result", [followed, swinging], ids=["trajectory", "motion"])
+@cache
+def bent() -> sr.Trajectory:
+    model = sr.load_model(sr.PccArm(elastic_sections=1))
+    held = sr.solve_equilibrium(model, model.relaxed_motors, (1.0, 2.0, -3.0))
+    return sr.Trajectory(TIMES[:1], held.tip_position[None], (held,), "held")
+
+
+@pytest.mark.parametrize("result", [followed, swinging, bent], ids=["trajectory", "motion", "muscles"])
 def test_a_log_is_read_back_with_every_digit(tmp_path: Path, tool: Tool, result: Callable[[], Any]) -> None:
     tool("mcap_ros2")
     moved = result()
@@ -125,8 +138,13 @@ def test_a_log_is_read_back_with_every_digit(tmp_path: Path, tool: Tool, result:
         assert [time for time, _ in topics[topic]] == np.round(1e9 * times).astype(int).tolist()
     np.testing.assert_array_equal([message.position for _, message in topics["/actuators"]], moved.q_motors)
     assert topics["/actuators"][0][1].name == list(moved.model.actuator_names)
+    tensions = len(moved.model.muscles) > 0
+    exerted = moved.motor_torques if tensions else -moved.motor_torques
+    np.testing.assert_array_equal([message.effort for _, message in topics["/actuators"]], exerted)
     states = [dict(zip(message.name, message.position, strict=True)) for _, message in topics["/joint_states"]]
-    np.testing.assert_array_equal([[state[name] for name in moved.model.spring_joints] for state in states], moved.q_springs)
+    if not tensions:  # joints are strains, of which elastic coordinates are combinations
+        springs = [[state[name] for name in moved.model.spring_joints] for state in states]
+        np.testing.assert_array_equal(springs, moved.q_springs)
     tips = [[getattr(message.pose.position, axis) for axis in "xyz"] for _, message in topics["/tip_pose"]]
     expected = moved.tip_position if isinstance(moved, sr.Motion) else moved.tip_positions
     np.testing.assert_allclose(tips, expected, rtol=0, atol=1e-12)

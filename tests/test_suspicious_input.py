@@ -30,7 +30,7 @@ def asked(call: Callable[[], Any]) -> list[str]:
     with warnings.catch_warnings(record=True) as told:
         warnings.simplefilter("always")
         call()
-    found = [one for one in told if issubclass(one.category, sr.SuspiciousInputWarning)]
+    found = [one for one in told if issubclass(one.category, sr.SuspiciousInputWarning | sr.AssumedStiffnessWarning)]
     assert all(one.filename == __file__ for one in found)
     return [str(one.message) for one in found]
 
@@ -54,8 +54,8 @@ def test_what_is_within_the_limits_is_not_asked_and_the_same_in_degrees_is(angle
 CASES: list[tuple[Callable[[], Any], str]] = [
     (lambda: sr.solve_equilibrium(ARM, (17, 34, -46)), "motor_1 = 17 rad is 974 degrees; it looks like degrees (did you mean "),
     (lambda: sr.solve_equilibrium(ARM, dict.fromkeys(ARM.actuator_names, 40)), "radians(40) = 0.6981"),
-    (lambda: sr.InflatableArm(stiffness=172.71, link_lengths=(60, 60)), "link_lengths = 60 m is 100 times the usual 0.6 m"),
-    (lambda: sr.InflatableArm(stiffness=172.71, radius=55), "looks like millimetres (did you mean 0.055 m?)"),
+    (lambda: sr.InflatableArm(link_lengths=(60, 60)), "link_lengths = 60 m is 100 times the usual 0.6 m"),
+    (lambda: sr.InflatableArm(radius=55), "looks like millimetres (did you mean 0.055 m?)"),
     (lambda: sr.InflatableArm(motor_limit=180), "motor_limit = 180 rad is"),
     (
         lambda: sr.InflatableArm(stiffness=172.71, pressure=50),
@@ -134,6 +134,11 @@ def test_the_command_asks_in_one_line_and_refuses_centimetres(capsys: pytest.Cap
         (lambda: sr.identify(sr.InflatableArm(), [1, 2], ("stiffness",)), "Measurements.from_csv"),
         (lambda: sr.solve_ik(ARM, (90, 30, 20)), "; its reach is 1.2 m"),
         (lambda: sr.plot(sr.linearize(ARM, sr.solve_equilibrium(ARM, (0, 0, 0)))), "softrobots.view.figures draws others"),
+        (
+            lambda: sr.InflatableArm(lengths=(0.6,)),
+            "'lengths' (did you mean 'link_lengths'?); available:\n  link_lengths [m], ",
+        ),
+        (lambda: sr.PccArm(payload=0.5), "a load on the tip of any robot: force= or wrench= of the solvers, or a body by"),
         (lambda: sr.load_model(BRANCHED), "--spring JOINT=STIFFNESS"),
     ],
 )

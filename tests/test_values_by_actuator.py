@@ -13,7 +13,8 @@ from hypothesis import strategies as st
 from scipy.linalg import expm
 
 import softrobots as sr
-from softrobots.robots.fields import facts_of, numbers, per_actuator
+from softrobots.robots.field_values import numbers
+from softrobots.robots.fields import facts_of, per_actuator
 from tests.support.laws import law
 from tests.support.tables import each_row
 

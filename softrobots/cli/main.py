@@ -61,6 +61,13 @@ _ALIASES = {
 }
 """Arguments of the library whose option has another name, where a command has that option."""
 
+_FIRST = """`softrobots COMMAND --help` explains a command, with examples.
+
+examples:
+  softrobots urdf --list                                        the robots by name; a URDF, MJCF or SDF file is one, too
+  softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --force 0 10 -15   the certified equilibrium
+  softrobots view inflatable_arm --interactive page.html        a page in which it is solved as you drag"""
+
 _SPELLED = {"robot": "ROBOT", "lengths": "L", "arcs": "--arc"}
 """Options whose spelling is not their name with dashes before it."""
 
@@ -129,7 +136,7 @@ def parser() -> argparse.ArgumentParser:
     command_parser = Parser(
         prog="softrobots",
         description="Soft robots as robot descriptions that robotics tools can load, with certified statics.",
-        epilog="`softrobots COMMAND --help` explains a command.",
+        epilog=_FIRST,
     )
     command_parser.add_argument("--version", action="version", version=f"%(prog)s {__version__}")
     command_parser.set_defaults(whole=command_parser)  # for `softrobots completion`
@@ -153,6 +160,9 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> object:
     """Run a subcommand; a ParameterError names the option instead of the library's argument."""
+    if not (sys.argv[1:] if argv is None else argv):
+        parser().print_help()
+        sys.exit(2)
     arguments = parser().parse_args(argv)
     try:
         return arguments.run(arguments)

@@ -5,8 +5,10 @@ Each function returns the checked value in its final type, or raises `ParameterE
 
 from __future__ import annotations
 
+import copyreg
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from types import MappingProxyType
 from typing import Any, TypeVar
 
 import numpy as np
@@ -16,6 +18,8 @@ from softrobots.core.errors import ParameterError
 
 FloatArray = NDArray[np.float64]
 Kind = TypeVar("Kind")
+Key = TypeVar("Key")
+Entry = TypeVar("Entry")
 
 LARGEST = 1e30
 """Largest magnitude accepted, and inverse of the smallest positive number: squares and cubes of others would overflow."""
@@ -187,6 +191,15 @@ def read_only(array: FloatArray) -> FloatArray:
     """Mark an array as read-only and return it."""
     array.setflags(write=False)
     return array
+
+
+def read_only_mapping(values: Mapping[Key, Entry]) -> MappingProxyType[Key, Entry]:
+    """Return a copy of a mapping that cannot be written."""
+    return MappingProxyType(dict(values))
+
+
+# Python pickles no read-only mapping; results that hold one cross to other processes with this.
+copyreg.pickle(MappingProxyType, lambda values: (read_only_mapping, (dict(values),)))
 
 
 def increasing(name: str, values: FloatArray, unit: str) -> FloatArray:

@@ -65,6 +65,10 @@ class NameNotFound(SoftRobotsError, LookupError):
         super().__init__(f"no {kind} is called {name!r}{hint}; available:{listed}")
 
 
+class FieldNotFound(NameNotFound, TypeError):
+    """An argument of a robot that is none of its parameters."""
+
+
 class StraightTube(SoftRobotsError, ValueError):
     """A tube without helix radius: contraction 1 and angle 0, up to rounding."""
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -257,11 +257,19 @@ def curve(times: FloatArray, values: FloatArray) -> Callable[[Any], FloatArray]:
     It takes a time, or several, shape (k,), and returns shape (m,), or (k, m).
     """
     if len(times) == 1:
-        return lambda time: np.broadcast_to(values[0], (*np.shape(time), values.shape[1]))
+        return partial(_constant, values[0])
     from scipy.interpolate import CubicSpline
 
     spline = CubicSpline(times, values, bc_type="clamped")
-    return lambda time: np.asarray(spline(np.clip(time, times[0], times[-1])))
+    return partial(_along, spline, times[0], times[-1])
+
+
+def _constant(values: FloatArray, time: Any) -> FloatArray:
+    return np.broadcast_to(values, (*np.shape(time), len(values)))
+
+
+def _along(spline: Any, first: float, last: float, time: Any) -> FloatArray:
+    return np.asarray(spline(np.clip(time, first, last)))
 
 
 def waypoint_curve(name: str, trajectory: Trajectory, model: SoftModel, values: FloatArray) -> Callable[[Any], FloatArray]:

@@ -16,12 +16,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, read_only_mapping
 from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import RigidTree
 from softrobots.description.urdf_tags import ActuatorTag, SpringTag
@@ -91,7 +90,8 @@ def hold(model: Any, q_motors: Any = None, *, apart: Sequence[str] = ()) -> Held
     pairs = zip(checked.muscles, pulls.tolist(), strict=True)
     tensions = {tag.name: tension for tag, tension in pairs if tag.kind not in apart}
     springs = _pulled_springs(checked, pulls)
-    return HeldRobot(MappingProxyType(motors), MappingProxyType(springs), structure.locked_joints, MappingProxyType(tensions))
+    held = read_only_mapping(motors), read_only_mapping(springs)
+    return HeldRobot(*held, structure.locked_joints, read_only_mapping(tensions))
 
 
 def _refuse_coupled(tags: Sequence[ActuatorTag], robot: str) -> None:

@@ -49,8 +49,9 @@ def require_mcap() -> Any:
 def write_mcap(result: Any, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
     """Write a result as a log of ROS 2 messages in MCAP, for Foxglove, PlotJuggler and `ros2 bag play`.
 
-    Topics: `/robot_description` (the URDF), `/joint_states` (every joint), `/actuators` (`q_motors` as positions), `/tf` (every
-    link) and `/tip_pose`, both in the frame `world`. Times are those since the start [s], an equilibrium is at zero.
+    Topics: `/robot_description` (the URDF), `/joint_states` (every joint), `/actuators` (`q_motors` as positions), both with
+    what the actuators exert as efforts, `/tf` (every link) and `/tip_pose`, both in the frame `world`. Times are those since
+    the start [s], an equilibrium is at zero.
 
     Args:
         result: The equilibrium, IK solution, trajectory or motion.
@@ -83,8 +84,8 @@ def write_mcap(result: Any, path: str | os.PathLike[str], *, overwrite: bool = F
             for row, time in enumerate(rows.times.tolist()):
                 head, positions = {"stamp": stamp(time), "frame_id": WORLD}, rows.joints(row)
                 inputs = dict(zip(model.actuator_names, rows.q_motors[row].tolist(), strict=True))
-                add("/joint_states", JOINT_STATE, time, joint_state(time, positions))
-                add("/actuators", JOINT_STATE, time, joint_state(time, inputs))
+                add("/joint_states", JOINT_STATE, time, joint_state(time, positions, rows.exerted(row)))
+                add("/actuators", JOINT_STATE, time, joint_state(time, inputs, rows.exerted(row)))
                 point = model.coordinates.at(rows.q_motors[row], rows.q_springs[row])
                 pin.framesForwardKinematics(model.pinocchio, data, model.embed(point.joints))
                 places = [_place(data.oMf[model.pinocchio.getFrameId(link.name, pin.FrameType.BODY)]) for link in links]

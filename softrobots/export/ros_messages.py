@@ -38,12 +38,19 @@ class Rows(NamedTuple):
     q_springs: FloatArray
     """Elastic coordinates, shape (n, n_springs) [rad or m]."""
 
+    efforts: FloatArray
+    """What each actuator exerts: the torque or force of a joint, the tension of a muscle, shape (n, n_motors) [N m or N]."""
+
     def joints(self, row: int) -> dict[str, float]:
         """Position of every joint that can move, by name [rad or m]; locked ones stand at zero."""
         chain = self.model.pinocchio
         values = self.model.coordinates.at(self.q_motors[row], self.q_springs[row]).joints.tolist()
         places = {name: chain.joints[chain.getJointId(name)].idx_v for name in list(chain.names)[1:]}  # the first is the world
         return {name: values[place] for name, place in places.items()} | dict.fromkeys(self.model.structure.locked_joints, 0.0)
+
+    def exerted(self, row: int) -> dict[str, float]:
+        """What each actuator exerts, by name [N m or N]."""
+        return dict(zip(self.model.actuator_names, self.efforts[row].tolist(), strict=True))
 
 
 def rows_of(result: Any) -> Rows:
@@ -57,17 +64,18 @@ def rows_of(result: Any) -> Rows:
     if isinstance(result, IkSolution):
         result = result.equilibrium
     if isinstance(result, Equilibrium):
-        motors = result.q_motors[None]
-        return Rows(result.model, np.zeros(1), motors, np.zeros_like(motors), result.q_springs[None])
-    if isinstance(result, Motion):
-        times = result.time - result.time[0]
-        return Rows(result.model, times, result.q_motors, result.motor_velocities, result.q_springs)
-    if not isinstance(result, Trajectory):
+        times, rates = np.zeros(1), np.zeros((1, len(result.q_motors)))
+    elif isinstance(result, Motion):
+        times, rates = result.time, result.motor_velocities
+    elif isinstance(result, Trajectory):
+        times, rates = result.times, np.zeros_like(result.q_motors)
+        if len(rates) > 2:
+            rates[1:-1] = np.gradient(result.q_motors, times, axis=0)[1:-1]
+    else:
         raise ParameterError("result", result, "an equilibrium, an IK solution, a trajectory or a motion")
-    rates = np.zeros_like(result.q_motors)
-    if len(rates) > 2:
-        rates[1:-1] = np.gradient(result.q_motors, result.times, axis=0)[1:-1]
-    return Rows(result.model, result.times - result.times[0], result.q_motors, rates, result.q_springs)
+    motors, springs, loads = map(np.atleast_2d, (result.q_motors, result.q_springs, result.motor_torques))
+    signs = np.where(np.arange(motors.shape[1]) < motors.shape[1] - len(result.model.muscles), -1.0, 1.0)
+    return Rows(result.model, times - times[0], motors, rates, springs, signs * loads + 0.0)
 
 
 def nanoseconds(seconds: float) -> int:
@@ -81,10 +89,11 @@ def stamp(seconds: float) -> dict[str, int]:
     return {"sec": whole, "nanosec": rest}
 
 
-def joint_state(seconds: float, positions: dict[str, float]) -> dict[str, Any]:
-    """Return positions by joint [rad or m] as a JointState message."""
-    header = {"stamp": stamp(seconds), "frame_id": ""}
-    return {"header": header, "name": list(positions), "position": list(positions.values()), "velocity": [], "effort": []}
+def joint_state(seconds: float, positions: dict[str, float], efforts: dict[str, float]) -> dict[str, Any]:
+    """Return positions by joint [rad or m], and what actuators exert there [N m or N], as a JointState message."""
+    exerted = [efforts.get(name, 0.0) for name in positions]
+    values = {"name": list(positions), "position": list(positions.values()), "velocity": [], "effort": exerted}
+    return {"header": {"stamp": stamp(seconds), "frame_id": ""}, **values}
 
 
 def to_ros2_yaml(result: Any, *, joints: Sequence[str] | None = None) -> str:
@@ -93,7 +102,9 @@ def to_ros2_yaml(result: Any, *, joints: Sequence[str] | None = None) -> str:
     A trajectory or a motion becomes a JointTrajectory of the actuators with positions, velocities and times since its start;
     velocities of a trajectory are differences of its positions, zero at both ends, as controllers require. Waypoints without
     times are a second apart. An actuator that is no joint (a tension, a pressure) has its input as position [N or Pa]. An
-    equilibrium or an IK solution becomes a JointState of all joints, springs too, for `robot_state_publisher`.
+    equilibrium or an IK solution becomes a JointState of all joints, springs too, for `robot_state_publisher`; its efforts are
+    the torques that the motors exert, the negative of the loads that they carry, and zero at joints without a motor. A
+    JointTrajectory has none, as controllers of positions refuse it with them.
 
     Args:
         result: The equilibrium, IK solution, trajectory or motion.
@@ -109,7 +120,8 @@ def to_ros2_yaml(result: Any, *, joints: Sequence[str] | None = None) -> str:
     rows = rows_of(result)
     if isinstance(result, Equilibrium | IkSolution):
         positions = rows.joints(0)
-        message = joint_state(0.0, {name: positions[name] for name in _chosen("joint", joints, positions)})
+        shown = {name: positions[name] for name in _chosen("joint", joints, positions)}
+        message = joint_state(0.0, shown, rows.exerted(0))
         return "".join([f"# {JOINT_STATE}\n", *(f"{field}: {yaml_of(value)}\n" for field, value in message.items())])
     names = rows.model.actuator_names
     chosen = _chosen("actuator", joints, names)

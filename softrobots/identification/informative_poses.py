@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
+from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only, read_only_mapping
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.core.summary import Part, Summarised, Table
 from softrobots.identification.gauges import find_gauges
@@ -145,7 +144,7 @@ def informative_poses(
         indices=counted[indices],
         log_det=float(np.linalg.slogdet(start + inside.T @ inside)[1]),
         intervals=read_only(best.intervals(chosen.values, chosen.logarithmic)),
-        margins=MappingProxyType({name: read_only(width) for name, width in widths.items()}),
+        margins=read_only_mapping({name: read_only(width) for name, width in widths.items()}),
     )
 
 

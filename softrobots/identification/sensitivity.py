@@ -11,7 +11,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
 from softrobots.core.errors import ParameterError
-from softrobots.core.summary import Part, Summarised, Table
+from softrobots.core.summary import Part, Summarised, Table, short
 from softrobots.dynamics.vibration import VibrationModes
 from softrobots.identification.derivatives.frequency_derivatives import frequency_slopes
 from softrobots.identification.friction_derivatives import friction_loads
@@ -52,6 +52,10 @@ class Sensitivity(Summarised):
     def units(self) -> tuple[str, ...]:
         """Unit of each parameter."""
         return self.parameters.units
+
+    def __repr__(self) -> str:
+        """What is derived by which parameters."""
+        return f"Sensitivity({self.equilibrium.model.pinocchio.name!r} by {short(', '.join(self.names))})"
 
     def summary_parts(self) -> list[Part]:
         """Return the derivatives of the position of the tip, a line a parameter."""

@@ -13,13 +13,13 @@ from softrobots.constant_curvature import muscle_residual
 from softrobots.core.checks import finite_array, finite_number
 from softrobots.core.errors import ParameterError
 from softrobots.description.actuator_reader import NUMBERS
+from softrobots.robots.field_values import numbers
 from softrobots.robots.fields import (
     PerPart,
     XacroRobot,
     check_actuator_parameters,
     check_parameters,
     facts_of,
-    numbers,
     parameter,
     per_part,
     refuse_given,

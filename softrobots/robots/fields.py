@@ -7,6 +7,7 @@ them, and a test compares the xacro files with them.
 from __future__ import annotations
 
 import dataclasses
+import inspect
 from collections.abc import Sequence
 from dataclasses import Field, dataclass
 from functools import lru_cache
@@ -15,19 +16,18 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from softrobots.core.checks import choice, finite_array, finite_number, instance_of, positive_integer
-from softrobots.core.errors import ParameterError
+from softrobots.core.errors import FieldNotFound, ParameterError
 from softrobots.core.field_help import FieldHelp
-from softrobots.core.suspicion import NEXT_TO_NO_PRESSURE, question_angle, question_length, question_pressure
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
+from softrobots.robots.field_values import checked_value, numbers, within
 
 MOST_PARTS = 1000
 """Largest number of links or segments; xacro takes minutes for that many."""
 
-_FAR = 50.0  # times its default, from which on a length is hardly in m
-_THIN = 1e-3  # [m] walls and wires of any thickness are as usual as thin ones
-_TURNS = 4.0 * np.pi  # angle from which on it is hardly in rad
+_ELSEWHERE = {
+    "payload": ["a load on the tip of any robot: force= or wrench= of the solvers, or a body by softrobots.mount(robot, body)"]
+}  # what users look for among the fields of every robot
 
 PerPart = float | Sequence[float]
 """One number for all links or segments, or one for each, base to tip."""
@@ -37,6 +37,7 @@ Form = Literal["single", "per_part", "per_actuator", "colour", "special"]
 robot itself."""
 
 Value = TypeVar("Value")
+RobotClass = TypeVar("RobotClass", bound="XacroRobot")
 
 
 @dataclass(frozen=True)
@@ -135,7 +136,7 @@ def check_parameters(robot: Any, parts: str = "parts", lengths: str | None = Non
     for field in dataclasses.fields(robot):
         value, facts = getattr(robot, field.name), field.metadata["facts"]
         if facts.form not in ("special", "per_actuator") and not (value is None and field.default is None):
-            object.__setattr__(robot, field.name, _checked(field, facts, value, count, parts))
+            object.__setattr__(robot, field.name, checked_value(field, value, count, parts))
     return count
 
 
@@ -149,7 +150,7 @@ def check_actuator_parameters(robot: Any, count: int, parts: str, actuators: int
         value, facts = getattr(robot, field.name), field.metadata["facts"]
         if facts.form == "per_actuator" and not (value is None and field.default is None):
             given = numbers(field.name, value, count, facts.unit, parts, actuators)
-            object.__setattr__(robot, field.name, _within(field, given))
+            object.__setattr__(robot, field.name, within(field, given))
 
 
 def refuse_given(robot: Any, names: Sequence[str], requirement: str) -> None:
@@ -161,66 +162,12 @@ def refuse_given(robot: Any, names: Sequence[str], requirement: str) -> None:
             raise ParameterError(field.name, getattr(robot, field.name), f"left out {requirement}; it has no effect there")
 
 
-def numbers(
-    name: str, value: Any, count: int | None, unit: str, parts: str = "parts", actuators: int | None = None
-) -> tuple[float, ...]:
-    """Return numbers as a tuple of `count`, a single one repeated, of any length without `count`; or raise ParameterError.
+class _FieldsAsArguments:
+    """Signature of a class, which Python would else take from `__new__`."""
 
-    A list may have as many as there are `actuators`, too.
-    """
-    if isinstance(value, str | bytes):
-        raise ParameterError(name, value, f"a number or a list of numbers [{unit}]")
-    if count is not None and not isinstance(value, Sequence) and getattr(value, "ndim", 0) == 0:
-        return (finite_number(name, value, unit),) * count
-    values = tuple(finite_array(name, value, (None,), unit).tolist())
-    if count is not None and len(values) not in (count, actuators):
-        each = "" if actuators is None else f" or of the {actuators} actuators"
-        raise ParameterError(name, value, f"one number, or one for each of the {count} {parts}{each} [{unit}]")
-    return values
-
-
-def _checked(field: Field[Any], facts: Facts, value: Any, count: int, parts: str) -> Any:
-    name = field.name
-    if facts.options:
-        return choice(name, value, facts.options)
-    if isinstance(field.default, bool):
-        return instance_of(name, value, bool, "True or False")
-    if isinstance(field.default, int):
-        return positive_integer(name, value, None if facts.at_most is None else int(facts.at_most))
-    if facts.form == "colour":
-        return _colours(name, value, count, parts)
-    each = facts.form == "per_part"
-    values = numbers(name, value, count, facts.unit, parts) if each else (finite_number(name, value, facts.unit),)
-    return _within(field, values) if each else _within(field, values)[0]
-
-
-def _within(field: Field[Any], values: tuple[float, ...]) -> tuple[float, ...]:
-    """The numbers, if there are none or all are within the bounds; asks whether one that is far from the default is meant."""
-    name, facts = field.name, field.metadata["facts"]
-    if values and not facts.allow(values):
-        raise ParameterError(name, values if len(values) > 1 else values[0], f"{facts.bounds} [{facts.unit}]")
-    largest = max(values, key=abs, default=0.0)
-    default: Any = field.default
-    usual = 0.0 if default is None else float(np.max(default))
-    if facts.unit == "m" and usual >= _THIN and largest >= _FAR * usual:
-        question_length(name, largest, usual)
-    elif facts.unit == "rad" and abs(largest) > _TURNS:
-        question_angle(name, largest)
-    elif facts.unit == "Pa" and 0.0 < abs(largest) < NEXT_TO_NO_PRESSURE:
-        question_pressure(name, largest)
-    return values
-
-
-def _colours(name: str, value: Any, count: int, parts: str) -> tuple[tuple[float, ...], ...]:
-    requirement = f"red, green, blue, opacity in [0, 1]: one colour, or one for each of the {count} {parts}"
-    try:
-        single = np.ndim(value) == 1
-        checked = finite_array(name, np.tile(value, (count, 1)) if single else value, (count, 4))
-    except (ParameterError, ValueError) as error:
-        raise ParameterError(name, value, requirement) from error
-    if checked.min() < 0.0 or checked.max() > 1.0:
-        raise ParameterError(name, value, requirement)
-    return tuple(tuple(colour) for colour in checked.tolist())
+    def __get__(self, instance: object, cls: type) -> inspect.Signature:
+        whole = inspect.signature(cls.__init__)  # type: ignore[misc]
+        return whole.replace(parameters=list(whole.parameters.values())[1:])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -230,6 +177,16 @@ class XacroRobot(FieldHelp):
     XACRO: ClassVar[str | Path]
     """The file that describes the robot: a name in xacro/, or a path."""
     _text: ClassVar[str | None] = None  # its URDF text, where a robot was made together with it
+    __signature__ = _FieldsAsArguments()
+
+    def __new__(cls: type[RobotClass], *_: Any, **values: Any) -> RobotClass:
+        """Refuse fields that the robot does not have, before its constructor does with less to say."""
+        units = {name: facts.unit for name, facts in facts_of(cls).items()}
+        for name in values:
+            if name not in units:
+                known = ", ".join(f"{field} [{unit}]" if unit else field for field, unit in units.items())
+                raise FieldNotFound(f"field of {cls.__name__}", name, units, lines=[known, *_ELSEWHERE.get(name, ())])
+        return object.__new__(cls)
 
     @property
     def n_joints(self) -> int:

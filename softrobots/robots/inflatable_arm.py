@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.errors import ParameterError
-from softrobots.robots.fields import PerPart, numbers, parameter, per_part, refuse_given
+from softrobots.robots.field_values import numbers
+from softrobots.robots.fields import PerPart, parameter, per_part, refuse_given
 from softrobots.robots.inflated_links import InflatedLinks
 
 

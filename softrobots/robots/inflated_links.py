@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import MOMENT_LAWS
+from softrobots.robots.field_values import questionable
 from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, parameter, per_part, refuse_given
 
 LINK_MODELS = ("paper", "two_hinges")
@@ -290,7 +291,7 @@ class InflatedLinks(XacroRobot):
     def _tell_assumed_stiffness(self) -> None:
         paper = {"link_lengths" if name == "length" else name: value for name, value in PAPER_LINK.items()}
         others = [f"{name} = {self._each(name)}" for name, value in paper.items() if set(self._each(name)) != {value}]
-        if others:
+        if others and not any(questionable(one, self._each(one.name)) for one in fields(self) if one.name in paper):
             text = (
                 f"{', '.join(others)}: the springs are still those of the paper's link, {inflated_beam.MEAN_STIFFNESS} N m/rad "
                 "(length 0.6 m, radius 0.055 m, wall 0.0005 m, mean of 10 to 60 kPa); give stiffness, or young_modulus (its "

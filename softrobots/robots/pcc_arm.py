@@ -11,7 +11,8 @@ from softrobots.constant_curvature import AZIMUTHS
 from softrobots.core.checks import positive_array
 from softrobots.core.errors import ParameterError
 from softrobots.robots.continuum_arm import ContinuumArm
-from softrobots.robots.fields import PerPart, numbers, parameter, per_actuator, per_part
+from softrobots.robots.field_values import numbers
+from softrobots.robots.fields import PerPart, parameter, per_actuator, per_part
 
 
 @dataclass(frozen=True, kw_only=True)

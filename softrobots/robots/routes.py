@@ -11,7 +11,8 @@ import numpy as np
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.core.field_help import FieldHelp
-from softrobots.robots.fields import PerPart, argument_text, numbers
+from softrobots.robots.field_values import numbers
+from softrobots.robots.fields import PerPart, argument_text
 
 ROUTINGS = ("segment", "base")
 """Where the actuators of a segment start: where the segment does, or at the base of the robot."""

@@ -10,12 +10,11 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, read_only
+from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_integer, read_only, read_only_mapping
 from softrobots.core.errors import LoadNotFound, ParameterError
 from softrobots.core.result_file import text
 from softrobots.core.summary import Part, Summarised
@@ -235,7 +234,7 @@ def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others:
         singular_values=read_only(singular_values),
         unobservable_directions=read_only(unobservable),
         covariance=read_only(np.sum(list(parts.values()), axis=0)) if parts else None,
-        covariance_parts=MappingProxyType(parts),
+        covariance_parts=read_only_mapping(parts),
         residual=problem.residual(state),
         iterations=iterations,
         directions=None if problem.span is ANY else problem.span,

@@ -5,13 +5,12 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from types import MappingProxyType
 from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.checks import FloatArray, finite_array, read_only, read_only_mapping
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.environment.environment import Environment, fixed_environment
 from softrobots.model.joint_loads import JointLoad
@@ -74,7 +73,7 @@ class Load:
         """Copy the wrenches, read-only, and compute their terms."""
         copies = {frame: read_only(np.array(wrench)) for frame, wrench in self.wrenches.items()}
         terms = tuple(LoadTerm.of(frame, wrench) for frame, wrench in copies.items())
-        object.__setattr__(self, "wrenches", MappingProxyType(copies))
+        object.__setattr__(self, "wrenches", read_only_mapping(copies))
         object.__setattr__(self, "terms", terms)
         object.__setattr__(self, "conservative", all(term.norms[1] == 0.0 for term in terms))
 

@@ -6,12 +6,11 @@ import contextlib
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from types import MappingProxyType
 from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only
+from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only, read_only_mapping
 from softrobots.core.errors import ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
 from softrobots.core.summary import Part, Summarised
@@ -104,7 +103,7 @@ class Trajectory(Summarised):
         contacts = [equilibrium.contacts for equilibrium in self.equilibria]
         names = dict.fromkeys(contact.obstacle for row in contacts for contact in row)
         forces = [[sum(one.normal_force for one in row if one.obstacle == name) for row in contacts] for name in names]
-        return MappingProxyType({name: read_only(np.array(row, float)) for name, row in zip(names, forces, strict=True)})
+        return read_only_mapping({name: read_only(np.array(row, float)) for name, row in zip(names, forces, strict=True)})
 
     @property
     def required_pressure(self) -> float | None:

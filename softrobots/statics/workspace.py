@@ -56,6 +56,10 @@ class Workspace(Summarised):
     refused: int
     """Number of samples without a shape (inconsistent muscle lengths) or without a stable equilibrium."""
 
+    def __repr__(self) -> str:
+        """The robot, and how many samples have an equilibrium."""
+        return f"Workspace({self.model.pinocchio.name!r}, {len(self.q_motors)} samples, {self.refused} refused)"
+
     def summary_parts(self) -> list[Part]:
         """Return robot and load, what the tip reached, and the samples of the motors."""
         model, rows = self.model, [("", "least", "largest", "")]
