@@ -60,6 +60,9 @@ CASES = {
         (0.03, -0.02, 0.02),
     ),
     "elastic": Case(sr.TendonArm, {"segment_lengths": THIN}, MOTORS, (0.05, -0.03, 0.02)),
+    "loaded": Case(
+        sr.PccArm, {"segment_lengths": (0.5, 0.4), "kind": "tension"}, (40.0, 40.0, 40.0, 40.0, 40.0, 40.0), (8.0, 0.0, -3.0)
+    ),
     "mckibben": Case(
         sr.PccArm, {"segment_lengths": (0.5, 0.4), "kind": "mckibben"}, (9e4, 5e4, 7e4, 4e4, 6e4, 5e4), (1.0, -1.0, 0.5)
     ),
@@ -109,7 +112,7 @@ def test_the_arm_stands_in_mujoco_where_it_stands_here(tool: Tool, name: str) ->
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("name", ["helical", "elastic", "mckibben"])
+@pytest.mark.parametrize("name", ["helical", "elastic", "loaded", "mckibben"])
 def test_thirty_hinges_a_segment_are_within_a_ten_thousandth_of_the_length(tool: Tool, name: str) -> None:
     """From 8 to 30 hinges an error of second order becomes 14 times smaller."""
     coarse, fine = misses(tool("mujoco"), name, (8, 30))

@@ -5,18 +5,18 @@ per rest length at rest, for the share `f` of a section of rest length `h`. Wher
 and stretches by `e`, its length is :math:`f |c + w \times o + e|` with :math:`c = h t`, as along a section of constant strain.
 
 A leg from `o - c/2` on the link below the hinge to `o + c/2` on that above is a chord, too short by
-:math:`|w \times c|^2 / 8|c|`, and the tip of an arm with 30 hinges a segment is then off by a thousandth of its length. (A leg
-from `o` to `o + c` has an error of first order in `h`.) A leg along the backbone, from `c` on the link below to `2c` on that
-above, is too long by :math:`|w \times c|^2 / |c|`. So there are both, the first enlarged so that they share the stretch: with
-the motion `H` of the hinge
+:math:`(|c| + e) w^2 / 8`, and the tip of an arm with 30 hinges a segment is then off by a thousandth of its length. (A leg
+from `o` to `o + c` has an error of first order in `h`.) A leg along the backbone, from `p c` on the link below back to `q c` on
+that above, `p > q`, becomes shorter by `e`, and longer by :math:`p (q |c| + e) w^2 / (2 (p - q) - 2 e / |c|)`. So there are
+both, where the hinge has the motion `H`:
 
-.. math:: l = \tfrac{7 f}{8} \bigl|H\bigl(\tfrac87 (o + \tfrac c2)\bigr) - \tfrac87 (o - \tfrac c2)\bigr|
-          + \tfrac{f}{8} |H(2c) - c|
+.. math:: l = f g \bigl|H\bigl(\tfrac1g (o + \tfrac c2)\bigr) - \tfrac1g (o - \tfrac c2)\bigr|
+          + f (g - 1) |H(q c) - p c|, \quad g = \tfrac12 + \tfrac1{\sqrt3}, \quad p = 2 + \sqrt3, \quad q = \sqrt3
 
-(MuJoCo divides the lengths of branches by the divisors of pulleys). That is an eighth of the length at rest too long, which the
-laws of the actuators take away. The second leg is mirrored, from `-2c` to `-c`, where the hinge stretches before it bends, so
-that the stretch hardly changes its excess. What remains is a tenth of the error of the chord, and falls like `1/n^2` with `n`
-hinges.
+(MuJoCo divides the lengths of branches by the divisors of pulleys). The stretch counts once, and these numbers cancel the terms
+in :math:`w^2` and :math:`w^2 e`. The second leg is mirrored, from `-q c` to `-p c`, where the hinge stretches before it bends.
+At rest the tendon is longer than the actuator by :math:`2 (g - 1)`, 15 % of it, which the laws of the actuators take away.
+What remains falls like `1/n^2` with `n` hinges.
 """
 
 from __future__ import annotations
@@ -43,7 +43,8 @@ from softrobots.model.soft_model import SoftModel
 SPRINGY = ("elastic", "mckibben")
 """Kinds whose tension follows the length: welded, they are springs."""
 
-_CENTRAL = 0.125  # share of the legs along the backbone
+_NEAR, _FAR = math.sqrt(3.0), 2.0 + math.sqrt(3.0)  # q and p
+_CENTRAL = 1.0 / math.sqrt(3.0) - 0.5  # g - 1
 
 
 class Leg(NamedTuple):
@@ -138,9 +139,9 @@ def _legs(tag: ActuatorTag, sections: Sequence[SectionRow], hinges: Sequence[Seq
         hinge, share = hinges[point.section], point.weight / sections[point.section].length
         bodies, place = (hinge[0].parent, hinge[-1].child), hinge[0].placement
         offset, tangent = _offset_and_tangent(point, sections[point.section])
-        beside = (offset - 0.5 * tangent) / (1.0 - _CENTRAL), (offset + 0.5 * tangent) / (1.0 - _CENTRAL)
-        along = (-2.0 * tangent, -tangent) if hinge[0].kind == "prismatic" else (tangent, 2.0 * tangent)
-        for (below, above), part in ((beside, (1.0 - _CENTRAL) * share), (along, _CENTRAL * share)):
+        beside = (offset - 0.5 * tangent) / (1.0 + _CENTRAL), (offset + 0.5 * tangent) / (1.0 + _CENTRAL)
+        along = (-_NEAR * tangent, -_FAR * tangent) if hinge[0].kind == "prismatic" else (_FAR * tangent, _NEAR * tangent)
+        for (below, above), part in ((beside, (1.0 + _CENTRAL) * share), (along, _CENTRAL * share)):
             rest_length = part * float(np.linalg.norm(above - below))
             legs.append(Leg(1.0 / part, place.position + place.rotation @ below, above, bodies, rest_length))
     return tuple(legs)
