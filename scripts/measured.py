@@ -1,8 +1,8 @@
 """Compare models of the package with measurements that others have published.
 
 Each comparison has its measurements, with source and licence, in docs/examples or in the package, predicts them with the
-robots of the package, and tells the errors: an inflated link, tubes of kites, a long boom, a fly rod. The tendon-driven arm
-has scripts of its own, measured_arm.py and measured_arm_fit.py.
+robots of the package, and tells the errors: an inflated link, tubes of kites, a long boom, a fly rod, strips of laminate. The
+tendon-driven arm has scripts of its own, measured_arm.py and measured_arm_fit.py.
 
 Prints Markdown tables; under a minute for all.
 """
@@ -21,6 +21,7 @@ from softrobots.core.files import make_folder, write_text
 from softrobots.view.figures import canvas
 from studies.measured.boom import BOOM
 from studies.measured.comparison import Comparison, overview_table
+from studies.measured.composite_strip import COMPOSITE_STRIP
 from studies.measured.fly_rod import FLY_ROD
 from studies.measured.inflated_link import INFLATED_LINK
 from studies.measured.kite_tubes import KITE_TUBES
@@ -36,6 +37,7 @@ COMPARISONS: dict[str, Comparison] = {
     "kite_tubes": KITE_TUBES,
     "boom": BOOM,
     "fly_rod": FLY_ROD,
+    "composite_strip": COMPOSITE_STRIP,
 }
 """By name, in the order of the page."""
 BEGIN, END = "<!-- measured_overview:begin -->", "<!-- measured_overview:end -->"

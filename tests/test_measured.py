@@ -8,13 +8,14 @@ from typing import Any
 
 import numpy as np
 import pytest
-from scipy.optimize import brentq
+from scipy.integrate import solve_ivp
+from scipy.optimize import brentq, root
 
-from studies.measured import boom, fly_rod, inflated_link, kite_tubes
+from studies.measured import boom, composite_strip, fly_rod, inflated_link, kite_tubes
 from tests.conftest import CHECKOUT
 from tests.support.scripts import load_script, run_script
 
-NAMES = ("inflated_link", "kite_tubes", "boom", "fly_rod")
+NAMES = ("inflated_link", "kite_tubes", "boom", "fly_rod", "composite_strip")
 
 
 def recorded(name: str) -> Any:
@@ -147,6 +148,45 @@ def test_the_fly_rod_is_an_elastica() -> None:
     assert record["unloaded"]["found_m"] == pytest.approx(shapes[0], rel=0.007)
     assert np.array(record["found_m"]) == pytest.approx(np.array(shapes[1:]) - shapes[0], rel=0.004)
     assert fly_rod.deflections(record["young_Pa"], weights[-1:], pieces=14)[0, 0] == pytest.approx(shapes[-1][0], rel=0.02)
+
+
+# --- The strips of laminate
+
+
+def kirchhoff(laminate: composite_strip.Laminate, turn: float, weight: float) -> np.ndarray:
+    """Where a rod goes at the station: `d' = kappa x d`, `M = (r(L) - r) x F`, shot at r(L); flat along y at the clamp."""
+    stiffness = np.array([laminate.torsion, laminate.flat - laminate.coupling**2 / laminate.torsion, laminate.edge])
+    start = np.array([[1.0, 0.0, 0.0], [0.0, math.cos(turn), -math.sin(turn)], [0.0, math.sin(turn), math.cos(turn)]])
+    force = np.array([0.0, 0.0, -9.81 * weight])
+
+    def slope(_: float, state: np.ndarray, end: np.ndarray) -> np.ndarray:
+        axes = state[3:].reshape(3, 3)
+        curvature = axes.T @ (axes @ np.cross(end - state[:3], force) / stiffness)
+        return np.concatenate([axes[0], np.cross(curvature, axes).ravel()])
+
+    def shot(end: np.ndarray) -> Any:
+        begin = np.concatenate([np.zeros(3), start.ravel()])
+        return solve_ivp(slope, (0.0, 0.55), begin, args=(end,), rtol=1e-8, atol=1e-9, t_eval=(0.5, 0.55)).y[:3]
+
+    end = root(lambda place: shot(place)[:, 1] - place, np.array([0.5, 0.0, -0.2]), tol=1e-9).x
+    return shot(end)[:, 0]
+
+
+def test_a_strip_of_laminate_is_a_rod_of_three_stiffnesses() -> None:
+    """Every strip under its heaviest weight, to 1 mm (22 hinges are coarse in torsion); and the paper's own curve."""
+    record, points = recorded("composite_strip"), composite_strip.measurements()
+    assert len(points) == sum(len(row["points"]) for row in record["series"]) == 73
+    for row in record["series"]:
+        laminate, heaviest = composite_strip.LAMINATES[row["beam"]], max(point[1] for point in row["points"])
+        x, y, z = kirchhoff(laminate, math.radians(row["turn_deg"]), heaviest)
+        expected = {1: 0.5 - x, 2: y, 3: -z}
+        for (direction, weight, measured), found in zip(row["points"], row["found_m"], strict=True):
+            assert [row["beam"], math.radians(row["turn_deg"]), direction, weight, measured] in points.tolist()
+            if weight == heaviest:
+                assert abs(found) == pytest.approx(abs(expected[direction]), abs=1e-3)
+    loads, printed = np.array([[31.53, 68.97, 126.12, 233.48, 318.15, 400.83], [21.23, 45.49, 81.54, 142.51, 180.21, 211.82]])
+    down = 1e3 * composite_strip.displacements(composite_strip.LAMINATES[1], 0.0, 1e-3 * loads)[:, 2]
+    assert down == pytest.approx(printed, abs=2.0)  # read from a plot, whose curve is not smooth to 2 mm
 
 
 # --- The script
