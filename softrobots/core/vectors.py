@@ -17,7 +17,7 @@ def cross(a: FloatArray, b: FloatArray) -> FloatArray:
 
 def skew(vectors: FloatArray) -> FloatArray:
     """Return the cross-product matrices `[v]`, `[v] u = v x u`, shape (..., 3, 3), of vectors of shape (..., 3)."""
-    return np.asarray(vectors.dot(_PRODUCTS)).reshape(*vectors.shape, 3)
+    return np.asarray(vectors.reshape(-1, 3).dot(_PRODUCTS).reshape(*vectors.shape, 3))
 
 
 def axes_along(z: FloatArray) -> FloatArray:

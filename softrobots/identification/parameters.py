@@ -121,6 +121,11 @@ class ParameterSet:
         """Which change the model, shape (P,), truth values; the others change base, markers, actuator offsets or loads."""
         return np.array([one.place.kind in OF_MODEL for one in self.parameters], dtype=bool)
 
+    @cached_property
+    def direct(self) -> tuple[tuple[int, Parameter], ...]:
+        """Those that do not change the model, with their numbers, from 0."""
+        return tuple((number, one) for number, one in enumerate(self.parameters) if one.place.kind not in OF_MODEL)
+
     def places(self, kind: Kind) -> list[tuple[int, Parameter]]:
         """Return the parameters of a kind with their numbers, from 0."""
         return [(number, one) for number, one in enumerate(self.parameters) if one.place.kind == kind]

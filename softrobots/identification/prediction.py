@@ -154,7 +154,7 @@ class Prediction:
         """Rotation of a frame in the robot, shape (n, 3, 3)."""
         tree, number = self.at.tree, self.model.frame_id(self._frame(name))
         body, own = tree.frame(self._frame(name))[0], self.at.numbers["frames"][number, :, :3]
-        return np.asarray(tree.rotation[:, body] @ own if body >= 0 else np.broadcast_to(own, (len(tree.rotation), 3, 3)))
+        return np.asarray(tree.rotation[:, body] @ own)
 
 
 class Predictor:

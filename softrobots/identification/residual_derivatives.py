@@ -55,7 +55,7 @@ class States(NamedTuple):
     def of(cls, equilibria: Sequence[Equilibrium]) -> States:
         """Stack equilibria of one robot."""
         names = dict.fromkeys(name for one in equilibria for name in one.load.wrenches)
-        nothing = np.zeros(6)
+        nothing: FloatArray = np.zeros(6)
         loads = {name: np.array([one.load.wrenches.get(name, nothing) for one in equilibria]) for name in names}
         if any(one.load.gravity is not None for one in equilibria):
             loads[""] = np.array([one.load.gravity or (0.0, 0.0, 0.0) for one in equilibria])
@@ -126,6 +126,11 @@ class EquilibriumDerivatives:
                 return inverse
         return np.array([inverse_stiffness(self.model, one) for one in tangent])
 
+    @property
+    def is_plain(self) -> bool:
+        """Whether the robot has neither sections of constant strain nor actuators along the body."""
+        return self._sections is None and self.actuators is None
+
     def joint_rates(self, motors: FloatArray, strains: FloatArray) -> FloatArray:
         """Rates of the joints, shape (N, L, n_joints), at those of motor joints and of the strains, shape (N, L, ...)."""
         structure = self.model.structure
@@ -140,7 +145,7 @@ class EquilibriumDerivatives:
         """Derivatives of rows that twists change by motor joints, strains, and what the map of the sections depends on.
 
         Args:
-            by_twist: Derivatives by the twist of what is from each joint on, shape (N, L, n_joints, 6).
+            by_twist: Derivatives by the twist of what is from each joint on, shape (N, n_joints, L, 6).
             rates: The rates of the strains in which loads work, shape (N, L, n_strains): the map turns with the strains.
 
         Returns:
@@ -174,15 +179,17 @@ class AdjointRows:
         given = next(one for one in (outputs.pose, outputs.loads, outputs.strains) if one is not None)
         shape = given.shape[:2]
         self._weights = np.zeros((*shape, at.model.n_motors)) if outputs.loads is None else outputs.loads
-        self._by_pose, self._of_frame = np.zeros((*shape, at.model.pinocchio.nv, 6)), np.zeros((*shape, 6))
-        if outputs.pose is not None:
+        if outputs.pose is None:
+            self._by_pose, self._of_frame = np.zeros((shape[0], at.model.pinocchio.nv, shape[1], 6)), np.zeros((*shape, 6))
+        else:
             self._by_pose, self._of_frame = at.tree.pose_slopes(outputs.frame, outputs.pose)
         strains = np.zeros((*shape, at.strains.shape[1]))
         if at.slopes is not None:
             strains = self._weights[..., count:] @ np.swapaxes(at.slopes[0], -1, -2)
-        self._lengths = np.zeros_like(self._weights[..., count:])  # weights of the lengths of actuators at the same strains
-        motors, elastic = self._differentiate(strains, works=outputs.loads is not None)
-        by_actuators = np.zeros_like(self._weights)
+        self._lengths = np.zeros((*shape, at.model.n_motors - count))  # weights of the lengths of actuators at the same strains
+        self._move(strains, works=outputs.loads is not None)
+        motors, elastic, _ = self._by_coordinates()
+        by_actuators = np.zeros(self._weights.shape)
         by_actuators[..., :count] = motors
         if outputs.strains is not None:
             elastic = elastic + outputs.strains
@@ -195,40 +202,42 @@ class AdjointRows:
         """Derivatives of the outputs by the actuators, shape (N, L, n_motors)."""
         if at.slopes is not None:
             self._lengths = -self.by_actuators[..., count:]
-        self._differentiate(strains + (virtual if at.slopes is None else virtual @ np.swapaxes(at.slopes[1], -1, -2)))
+        self._move(strains + (virtual if at.slopes is None else virtual @ np.swapaxes(at.slopes[1], -1, -2)))
 
-    def _differentiate(self, strains: FloatArray, *, works: bool = True) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of pose and work, by motor joints and strains, at fixed virtual rates of strains, (N, L, n_strains)."""
-        at, by_twist = self._at, self._by_pose
+    def _move(self, strains: FloatArray, *, works: bool = True) -> None:
+        """Take virtual rates of strains, (N, L, n_strains), in which loads work; without `works` they are zero."""
+        at, self.virtual, self._works, self._by_twist = self._at, strains, works, self._by_pose
         if works:
             rates = at.joint_rates(self._weights[..., : at.n_joint_motors], strains)
-            self._twists = at.tree.twists(rates)
-            by_twist = by_twist + at.tree.work_slopes(rates, self._twists)
-        motors, by_strains, self._others = at.by_coordinates(by_twist, strains)
-        self.virtual, self._by_twist = strains, by_twist
-        if works:
-            by_strains = by_strains - at.springs.tangent(strains)
-        if works and at.actuators is not None:
+            self._twists, each = at.tree.twists(rates)
+            self._by_twist = self._by_pose + at.tree.work_slopes(self._twists, each)
+
+    def _by_coordinates(self) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
+        """Derivatives of pose and work, by motor joints, strains, and numbers of sections and actuators, at fixed rates."""
+        at = self._at
+        motors, by_strains, others = at.by_coordinates(self._by_twist, self.virtual)
+        if self._works:
+            by_strains = by_strains - at.springs.tangent(self.virtual)
+        if self._works and at.actuators is not None:
             tensions = self._weights[..., at.n_joint_motors :]
-            of_actuators, others = at.actuators.slopes(self._lengths, tensions, strains)
-            by_strains, self._others = by_strains + of_actuators, self._others | others
-        return motors, by_strains
+            of_actuators, by_numbers = at.actuators.slopes(self._lengths, tensions, self.virtual)
+            by_strains, others = by_strains + of_actuators, others | by_numbers
+        return motors, by_strains, others
 
     def by_numbers(self, change: ModelChange) -> FloatArray:
         """Derivatives of the outputs by the parameters of a change of the model, shape (N, L, P)."""
         at, total = self._at, np.zeros((*self.virtual.shape[:2], change.n_parameters))
-        found: dict[str, FloatArray | None] = dict(self._others)
+        found = {} if at.is_plain else self._by_coordinates()[2]
         if "placements" in change.by_number:
-            found["placements"] = at.tree.at_placements(self._by_twist)
-        if "masses" in change.by_number:
-            found["masses"] = at.tree.by_masses(self._twists)
+            found["placements"] = np.swapaxes(at.tree.at_placements(self._by_twist), 1, 2)
+        if "masses" in change.by_number and (by_masses := at.tree.by_masses(self._twists)) is not None:
+            found["masses"] = np.swapaxes(by_masses, 1, 2)
         if not change.by_number.keys().isdisjoint(("stiffness", "rest", "moments")):
             found |= at.springs.slopes(self.virtual)
         if at.slopes is not None and at.actuators is not None:
             found |= self._of_held_directions(at.actuators)
         for name, rows in found.items():
-            if rows is not None:
-                total += change.along(name, rows)
+            total += change.along(name, rows)
         if "frames" in change.by_number:
             frames = change.by_number["frames"].reshape(-1, 6, change.n_parameters)
             for name, rows in at.tree.by_frames(self._twists).items():
@@ -244,7 +253,7 @@ class AdjointRows:
     def by_base(self) -> FloatArray:
         """Derivatives of the outputs by a motion of the base (position, then rotation) while loads stay, shape (N, L, 6)."""
         tree, total = self._at.tree, np.zeros((*self.virtual.shape[:2], 6))
-        total += self._by_twist[..., tree.topology.parents < 0, :].sum(axis=-2)
+        total += self._by_twist[:, tree.topology.parents < 0].sum(axis=1)
         if self._outputs.pose is not None and tree.frame(self._outputs.frame)[0] < 0:
             total += self._of_frame
         return total

@@ -72,6 +72,10 @@ class SoftModel(SummarisedRobot):
 
     def __hash__(self) -> int:
         """Hash that fits `==`."""
+        return self._hash
+
+    @cached_property
+    def _hash(self) -> int:
         return hash(self._identity)
 
     @cached_property
