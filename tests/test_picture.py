@@ -1,7 +1,8 @@
-"""`plot`: one picture of one pose of any robot, which tells what it shows, to scale."""
+"""`plot`: a picture of a pose of any robot, which tells what it shows, to scale; the small one of notebooks; other figures."""
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from types import ModuleType
 from typing import Any
@@ -12,12 +13,16 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.core.result_file import KINDS
 from softrobots.description.third_party import robot_file
 from softrobots.statics.kinematics import backbone
 from softrobots.view.figures import canvas
+from softrobots.view.figures.inline import inline_picture
+from softrobots.view.figures.pose import DrawnPose
 from softrobots.view.mesh_triangles import triangles
 from softrobots.view.robot_shapes import RobotShapes
 from tests.support.figures import READABLE, smallest_text
+from tests.support.hostile_data import results
 from tests.support.laws import law
 
 ARM = sr.load_model(sr.InflatableArm())
@@ -125,6 +130,70 @@ def test_models_solutions_and_movements_are_drawn() -> None:
         assert any(points.shape == tips.shape and np.allclose(points, tips, atol=1e-12) for points in ends_of(figure.axes[0]))
     with pytest.raises(sr.ParameterError, match="a SoftModel, a Trajectory"):
         sr.plot(3)  # type: ignore[arg-type]
+
+
+UNDRAWN = {"characterisation", "measurements"}
+"""Kinds of results that have no figure of their own: that of a characterisation needs its data."""
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_kind_of_result_is_drawn_or_refused_with_those_that_are(kind: str) -> None:
+    if kind in UNDRAWN:
+        with pytest.raises(sr.ParameterError, match=r"a SoftModel, .* VibrationModes, Workspace, WorkspaceMap"):
+            sr.plot(results()[kind])
+    elif kind == "workspace_map":  # of one height, which is no area
+        with pytest.raises(sr.ParameterError, match="at least two coordinates"):
+            sr.plot(results()[kind])
+    else:
+        figure = sr.plot(results()[kind], title="A $ title")
+        assert figure.get_suptitle() == r"A \$ title"
+        assert smallest_text(figure) >= READABLE
+        assert figure._repr_png_().startswith(b"\x89PNG")
+
+
+NUMBER = r"-?\d+(?:\.\d+)?"
+
+
+def small_picture(result: Any) -> tuple[str, np.ndarray, float]:
+    """The picture in what a notebook shows of a result, the place of its tip [px], and its scale [px/m]."""
+    page = result._repr_html_()
+    svg = page[page.index("<svg") : page.index("</svg>")]
+    bar, label = re.search(rf"h({NUMBER})\" stroke", svg), re.search(r">([\d.e-]+) m</text>", svg)
+    *_, tip = re.findall(rf'cx="({NUMBER})" cy="({NUMBER})"', svg)
+    assert bar is not None
+    assert label is not None
+    return svg, np.array(tip, dtype=float), float(bar[1]) / float(label[1])
+
+
+@settings(max_examples=8)
+@given(st.tuples(ANGLE, ANGLE, ANGLE), PUSH)
+def test_a_notebook_shows_a_small_picture_to_scale(motors: tuple[float, ...], push: tuple[float, ...]) -> None:
+    """The way from the base to the tip, as the eye sees it, in the lengths of the bar; all within the picture."""
+    held = sr.solve_equilibrium(ARM, motors, push)
+    svg, tip, scale = small_picture(held)
+    assert len(svg) < 30_000
+    (line,) = re.findall(r'<path d="M([^"]*)" fill="none" stroke="#1a1a1a" stroke-width="1.1"', svg)
+    places = np.array([pair.split() for pair in line.split("L")], dtype=float)
+    back = DrawnPose.of(held).eye / np.linalg.norm(DrawnPose.of(held).eye)
+    way = held.tip_position - backbone(ARM, held.q)[0]
+    seen = np.linalg.norm(way - back * (back @ way))
+    assert np.linalg.norm(tip - places[0]) == pytest.approx(scale * seen, abs=0.25)  # places are told to 0.1 px
+    assert np.all((places >= 0.0) & (places <= (340.0, 240.0)))
+    x, y, z = np.round(held.tip_position, 4) + 0.0
+    assert f"<title>inflatable_arm, tip at ({x:g}, {y:g}, {z:g}) m" in svg
+
+
+@pytest.mark.study
+def test_every_robot_and_pose_has_a_small_picture_and_meshes_have_none() -> None:
+    for robot in ROBOTS.values():
+        assert len(small_picture(sr.load_model(robot))[0]) < 30_000
+    for kind in ("ik_solution", "imposed_displacement", "load_estimate", "trajectory", "contact_path", "motion"):
+        assert len(small_picture(results()[kind])[0]) < 30_000
+    motors = [f"panda_joint{number}" for number in (1, 2, 3, 5, 6, 7)]
+    file = robot_file("panda_description/urdf/panda.urdf")
+    panda = sr.load_model(file, springs={"panda_joint4": 200.0}, motors=motors, tip="panda_hand_tcp")
+    assert inline_picture(panda) == ""
 
 
 @pytest.mark.study

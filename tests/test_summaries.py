@@ -31,6 +31,10 @@ EVIL = '<script>alert(1)</script> & "it"'
 """A name as a hostile file has it."""
 
 
+DRAWN = {"svg", "title", "rect", "path", "circle", "text"}
+"""Elements of a small picture."""
+
+
 class _Reader(HTMLParser):
     """Texts of the cells of a page; refuses tags that are left open, closed twice, or could do something."""
 
@@ -41,7 +45,7 @@ class _Reader(HTMLParser):
         self.said = ""
 
     def handle_starttag(self, tag: str, attrs: object) -> None:
-        assert tag in {"div", "p", "br", "table", "caption", "tr", "th", "td"}
+        assert tag in {"div", "p", "br", "table", "caption", "tr", "th", "td"} | DRAWN
         if tag != "br":
             self.open.append(tag)
         if tag == "tr":

@@ -6,13 +6,10 @@ import argparse
 from collections.abc import Sequence
 from typing import Any
 
-import numpy as np
-
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
 from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
-from softrobots.core.checks import FloatArray, unit_vector
 from softrobots.core.errors import NoCriticalLoad
 from softrobots.core.summary import text_of
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch, branch_parts
@@ -63,7 +60,7 @@ def run(arguments: argparse.Namespace) -> bool:
         answer = {"branches": [], "stable_up_to": error.max_force, "units": {"stable_up_to": "N"}}
         print_answer(arguments, answer, [f"no branches: {error}"], [])
         return False
-    files = save(arguments, found) + write_plot(arguments, lambda: branches(found, _across(found, arguments.direction)))
+    files = save(arguments, found) + write_plot(arguments, lambda: branches(found))
     print_answer(arguments, _answer(found), text_of(branch_parts(found), None), files)
     return True
 
@@ -80,12 +77,3 @@ def _answer(found: Sequence[EquilibriumBranch]) -> dict[str, Any]:
         for branch in found
     ]
     return {"branches": rows, "units": units}
-
-
-def _across(found: Sequence[EquilibriumBranch], direction: Any) -> FloatArray:
-    """Direction across the push in which the ends of the branches lie furthest apart, shape (3,); any if they do not."""
-    unit = unit_vector("--direction", direction)
-    ends = np.array([branch.equilibria[-1].tip_position for branch in found])
-    spread = np.vstack([ends - ends.mean(axis=0), 1e-9 * np.eye(3)])
-    across = np.linalg.svd(spread @ (np.eye(3) - np.outer(unit, unit)))[2][0]
-    return np.asarray(across * np.sign(across[np.abs(across).argmax()]))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
@@ -11,6 +11,9 @@ import numpy as np
 from softrobots.core.field_help import FieldHelp, field_unit, with_field_help
 
 Class = TypeVar("Class", bound=type)
+
+PICTURES: dict[type, Callable[[Any], str]] = {}
+"""What draws a result of a class as an HTML element for a notebook; a module that can adds it."""
 
 MOST_ROWS = 20
 """Rows of a table that a summary shows; of a longer one the first and the last."""
@@ -91,8 +94,8 @@ def text_of(parts: Iterable[Part], rows: int | None = MOST_ROWS) -> str:
     return "\n\n".join(text for text in texts if text)
 
 
-def html_of(parts: Iterable[Part]) -> str:
-    """Return parts as HTML for a notebook, without scripts, and with names escaped."""
+def html_of(parts: Iterable[Part], picture: str = "") -> str:
+    """Return a picture, an HTML element, and parts as HTML for a notebook, without scripts, and with names escaped."""
     from html import escape
 
     blocks = [
@@ -100,7 +103,7 @@ def html_of(parts: Iterable[Part]) -> str:
         for part in parts
         if part and not (isinstance(part, Table) and not part.rows)
     ]
-    return f"<div>{''.join(blocks)}</div>"
+    return f"<div>{picture}{''.join(blocks)}</div>"
 
 
 def force_text(force: Any) -> str:
@@ -177,8 +180,9 @@ class Summarised(FieldHelp):
         return text_of(self.summary_parts(), rows)
 
     def _repr_html_(self) -> str:
-        """Show the summary in a notebook."""
-        return html_of(self.summary_parts())
+        """Show the summary in a notebook, of a robot in a pose below a small picture."""
+        draw = next((draw for kind, draw in PICTURES.items() if isinstance(self, kind)), None)
+        return html_of(self.summary_parts(), "" if draw is None else draw(self))
 
     def __str__(self) -> str:
         """Return the summary."""

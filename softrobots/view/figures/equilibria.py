@@ -53,12 +53,13 @@ def growing_load(branches: Mapping[str, Sequence[Equilibrium]], direction: Any, 
     return figure
 
 
-def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
+def branches(found: Sequence[EquilibriumBranch], across: Any = None) -> Any:
     """Displacement of the tip across a push and least eigenvalue over the force; a line for each branch, dashed if unstable.
 
     Args:
         found: Branches of `softrobots.post_buckling_branches`; displacements are relative to the first point of the first.
-        across: Direction of the displacement that is drawn, shape (3,), any length but zero, world axes.
+        across: Direction of the displacement that is drawn, shape (3,), any length but zero, world axes; by default the one
+            across the push in which the ends of the branches lie farthest apart.
 
     Returns:
         The figure.
@@ -67,9 +68,10 @@ def branches(found: Sequence[EquilibriumBranch], across: Any) -> Any:
         ParameterError: If there is no branch, or something else.
         MissingDependency: If matplotlib is not installed.
     """
-    unit = unit_vector("across", across)
+    unit = None if across is None else unit_vector("across", across)
     if not isinstance(found, Sequence) or not found or not all(isinstance(one, EquilibriumBranch) for one in found):
         raise ParameterError("found", found, "at least one EquilibriumBranch")
+    unit = _across(found) if unit is None else unit
     origin = found[0].equilibria[0].tip_position
     figure = new_figure((WIDTH, 8.2))
     upper, lower = figure.subplots(2, 1)
@@ -121,6 +123,16 @@ def reaction(runs: Mapping[str, Sequence[ImposedDisplacement]]) -> Any:
         axes.plot([], [], ls="", marker="o", ms=5, color="black", mfc=face, label=label)
     axes.legend(fontsize=9)
     return figure
+
+
+def _across(found: Sequence[EquilibriumBranch]) -> FloatArray:
+    """Direction across the push in which the ends of the branches lie farthest apart, shape (3,); any if they do not."""
+    pushes = np.array([sum(one.load.wrenches.values(), np.zeros(6))[:3] for branch in found for one in branch.equilibria])
+    push = np.linalg.svd(pushes - pushes[0], full_matrices=False)[2][0]  # what of the load grows
+    ends = np.array([branch.equilibria[-1].tip_position for branch in found])
+    spread = np.vstack([ends - ends.mean(axis=0), 1e-9 * np.eye(3)])
+    across = np.linalg.svd(spread @ (np.eye(3) - np.outer(push, push)))[2][0]
+    return np.asarray(across * np.sign(across[np.abs(across).argmax()]))
 
 
 def _check(lines: Any, kind: type) -> None:
