@@ -66,7 +66,8 @@ def rows_of(measurements: sr.Measurements) -> dict[str, Any]:
     """Everything in it, by name."""
     arrays = {"q_motors": measurements.q_motors, "mask": measurements.mask, **measurements.loads, **measurements.measured}
     arrays |= {f"std {name}": values for name, values in measurements.std.items()}
-    return arrays | {"labels": measurements.labels, "markers": dict(measurements.markers), "relative": measurements.relative}
+    arrays |= {"labels": measurements.labels, "markers": dict(measurements.markers), "relative": measurements.relative}
+    return arrays | {"actuators": measurements.actuators}
 
 
 def assert_same(first: sr.Measurements, second: sr.Measurements) -> None:
@@ -378,7 +379,9 @@ def measured(draw: st.DrawFn, n: int | None = None) -> sr.Measurements:
     poses[draw(st.integers(0, n - 1)), :3, :3] = np.nan
     places = rows(3, gaps)
     places[:, 0] = 1.0
-    choice = draw(st.fixed_dictionaries({name: st.booleans() for name in ("loads", "poses", "torques", "labels", "markers")}))
+    choice = draw(
+        st.fixed_dictionaries({name: st.booleans() for name in ("loads", "poses", "torques", "labels", "markers", "names")})
+    )
     arguments: dict[str, Any] = {"positions": {"elbow, left": places, "tip": rows(3, gaps)}, "relative": draw(st.booleans())}
     std: dict[str, Any] = {"positions.tip": 0.1 + rows(3) ** 2}
     if choice["loads"]:
@@ -394,6 +397,8 @@ def measured(draw: st.DrawFn, n: int | None = None) -> sr.Measurements:
         arguments |= {"labels": draw(st.lists(words, min_size=n, max_size=n)), "mask": rows(1)[:, 0] > 0.0}
     if choice["markers"]:
         arguments |= {"markers": {"elbow, left": "link_1"}}
+    if choice["names"]:
+        arguments |= {"actuators": draw(st.permutations(("motor_1", "motor_2")))}
     return sr.Measurements(rows(2), std=std, **arguments)
 
 
@@ -409,6 +414,54 @@ def test_files_and_copies_hold_the_same_to_the_last_bit(
     assert_same(rows, pickle.loads(pickle.dumps(rows)))
     with pytest.raises(sr.OutputExists):
         rows.to_csv(folder / "a.csv")
+
+
+ARM = sr.InflatableArm(stiffness=150.0)
+
+
+@settings(max_examples=20, deadline=None)
+@given(order=st.permutations(range(3)), seed=st.integers(0, 99))
+def test_actuators_by_name_are_those_of_the_robot_in_any_order(order: list[int], seed: int) -> None:
+    """Columns by name, rows by name, and an array with names are the same rows as in the order of the robot."""
+    random, model = np.random.default_rng(seed), sr.load_model(ARM)
+    q, torques, std = random.normal(size=(3, 4, 3))
+    others = {"tip_position": random.normal(size=(4, 3)), "force": np.ones((4, 3))}
+    plain = sr.Measurements(q, motor_torques=torques, std={"motor_torques": std**2}, **others)
+    names = [model.actuator_names[place] for place in order]
+    columns, loads = ({name: table[:, place] for name, place in zip(names, order, strict=True)} for table in (q, torques))
+    rows = [{name: column[row] for name, column in columns.items()} for row in range(4)]
+    mixed = {"std": {"motor_torques": std[:, order] ** 2}, **others}
+    for named in (
+        sr.Measurements(columns, motor_torques=dict(reversed(loads.items())), **mixed),
+        sr.Measurements(rows, motor_torques=loads, **mixed),
+        sr.Measurements(q[:, order], motor_torques=torques[:, order], actuators=names, **mixed),
+    ):
+        assert named.actuators == tuple(names)
+        named.check(model)
+        assert_same(named.in_order_of(model), plain)
+
+
+def test_a_fit_and_candidates_take_actuators_by_name() -> None:
+    """The same digits, measured and chosen, as with columns in the order of the robot."""
+    q = np.random.default_rng(3).uniform(-1.0, 1.0, (6, 3))
+    tips = np.array([sr.solve_equilibrium(sr.load_model(sr.InflatableArm()), row, (0, 0, -9)).tip_position for row in q])
+    force = np.tile((0.0, 0.0, -9.0), (6, 1))
+    names = ("motor_3", "motor_1", "motor_2")
+    columns = dict(zip(names, q[:, [2, 0, 1]].T, strict=True))
+    fits = [sr.identify(ARM, sr.Measurements(one, tip_position=tips, force=force), "stiffness") for one in (q, columns)]
+    assert fits[0].solution.tolist() == fits[1].solution.tolist()
+    chosen = [sr.informative_poses(ARM, "stiffness", one, 2, force=force).indices.tolist() for one in (q, columns)]
+    assert chosen[0] == chosen[1]
+    for wrong, kind, text in (
+        ({"motor_1": [0.1], "motor_2": [0.2]}, sr.ParameterError, "motor_3 missing"),
+        ({"motor_1": [0.1], "elbow": [0.2], "motor_3": [0.1]}, sr.NameNotFound, "no actuator is called 'elbow'"),
+        ({"motor_1": [0.1, 0.2], "motor_2": [0.2] * 3}, sr.ParameterError, "as many for one as for another"),
+        ({"motor_1": ["a"]}, sr.ParameterError, "a column of numbers"),
+    ):
+        with pytest.raises(kind, match=text):
+            sr.Measurements(wrong, tip_position=tips[:1]).check(sr.load_model(ARM))
+    with pytest.raises(sr.NameNotFound, match="no actuator of q_motors is called 'motor_3'"):
+        sr.Measurements(q, motor_torques=columns)
 
 
 @settings(max_examples=40)

@@ -74,9 +74,31 @@ def test_another_unit_is_asked_about_once(call: Callable[[], Any], text: str) ->
     assert text in told[0]
 
 
+ROWS = np.array([(0.1, 0.2, 0.3), (np.nan, 0.2, 0.3), (0.1, 0.2, -46.0), (0.1, 40.0, 0.3)])
+COMPILED = sr.compile(ARM, backend="python")
+
+
 @each_row(
     "call",
     [
+        lambda: COMPILED.equilibria(ROWS, (0, 0, 0)),
+        lambda: COMPILED.equilibria([dict(zip(ARM.actuator_names, row, strict=True)) for row in ROWS.tolist()], (0, 0, 0)),
+        lambda: sr.simulate(ARM, 0.001, lambda time: np.array([0.0, 40e3 * time, 0.0]), time_step=0.0005),
+        lambda: sr.follow_contact(ARM, np.linspace((0.1, 7.0, 0.0), (0.1, 8.0, 0.0), 3), environment=sr.Environment([])),
+    ],
+)
+def test_many_cases_are_asked_about_once_and_as_a_whole(call: Callable[[], Any]) -> None:
+    """The first row is in rad; of the others one angle is named, and one without a number (NaN) hides none."""
+    (told,) = asked(call)
+    assert told.startswith("motor_2 = ")
+    assert "looks like degrees" in told
+
+
+@each_row(
+    "call",
+    [
+        lambda: COMPILED.equilibria(ROWS[:1], (0, 0, 0)),
+        lambda: COMPILED.equilibria(np.zeros((0, 3)), (0, 0, 0)),
         lambda: sr.solve_equilibrium(ARM, (3.5, -4.0, 6.0)),  # beyond its limits, as a result says
         lambda: sr.load_model(BRANCHED, springs=SPRINGS, tip="finger").checked_motors(
             [100.5, 0.3, 0.0]

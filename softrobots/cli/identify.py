@@ -106,6 +106,7 @@ def run(arguments: argparse.Namespace) -> bool:
     model = statics_model_of(arguments)
     rows = Measurements.from_csv(arguments.data, arguments.columns)
     rows.check(model)
+    rows = rows.in_order_of(model)
     for doubt in doubtful_sizes(rows, model):
         warnings.warn(doubt, stacklevel=1)
     sets = {text: re.split(r",(?![^\[]*\])", text.replace(" ", "")) for text in arguments.fit}

@@ -202,6 +202,35 @@ def read_only_mapping(values: Mapping[Key, Entry]) -> MappingProxyType[Key, Entr
 copyreg.pickle(MappingProxyType, lambda values: (read_only_mapping, (dict(values),)))
 
 
+def by_column(values: Any) -> Any:
+    """Return a list of rows by name as columns by name, {name: [number of each row]}; anything else as it came."""
+    if not isinstance(values, list | tuple) or not values or not all(isinstance(row, Mapping) for row in values):
+        return values
+    return {name: [row.get(name) for row in values] for name in dict.fromkeys(name for row in values for name in row)}
+
+
+def stacked_columns(field: str, columns: Mapping[str, Any], described: Mapping[str, str]) -> FloatArray:
+    """Return columns of numbers side by side, shape (..., n); single numbers are repeated.
+
+    Args:
+        field: Name of the parameter, for errors.
+        columns: Numbers by name.
+        described: What each is, for errors, e.g. "motor_1 [rad]", by name, in the order of the result.
+
+    Raises:
+        ParameterError: If one is not made of numbers, or they have different lengths.
+    """
+    if not described:
+        return np.zeros(0)
+    for name, what in described.items():
+        if np.asarray(columns[name]).dtype.kind not in "fiu":
+            raise ParameterError(f"{field}[{name!r}]", columns[name], f"a number: {what}")
+    try:
+        return np.stack(np.broadcast_arrays(*(columns[name] for name in described)), axis=-1)
+    except ValueError as error:
+        raise ParameterError(field, columns, "a number for each actuator, or as many for one as for another") from error
+
+
 def increasing(name: str, values: FloatArray, unit: str) -> FloatArray:
     """Return `values`, shape (n,), if they increase, or raise ParameterError."""
     if np.any(np.diff(values) <= 0.0):

@@ -43,9 +43,10 @@ class MotorPath:
             self.breaks = q_motors.times[-1:] - q_motors.times[0]
         elif callable(q_motors):
             self._signal = motor_function("q_motors", q_motors, model)
-            for time in np.linspace(0.0, duration, 21).tolist():
-                model.actuators.checked(self._signal(time), f"q_motors(t={time:.6g})")
-            model.actuators.questioned(self._signal(0.0))
+            times = np.linspace(0.0, duration, 21).tolist()
+            model.actuators.questioned(
+                np.array([model.actuators.checked(self._signal(time), f"q_motors(t={time:.6g})") for time in times])
+            )
             self._find_kicks(model, duration)
         else:
             values = model.checked_motors(q_motors)

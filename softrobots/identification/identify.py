@@ -95,12 +95,14 @@ def identify(
     if loads:
         raise ParameterError("parameters", loads[0], "no load or actuator coordinate: measurements give those")
     prior = prior_of(chosen, priors or {})
+    measurements = measurements.in_order_of(chosen.present)
     counted, aside = _split(measurements, validation)
     in_order = chosen.present.structure.friction is not None
     rows = measurements if in_order else measurements[counted]
     counted = counted if in_order else np.ones(len(rows), dtype=bool)
     others = aside if in_order or aside is None or isinstance(aside, Measurements) else measurements[aside]
     if isinstance(others, Measurements):
+        others = others.in_order_of(chosen.present)
         others.check(chosen.present)
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW

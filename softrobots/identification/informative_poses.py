@@ -14,6 +14,7 @@ from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.core.summary import Part, Summarised, Table
 from softrobots.identification.gauges import find_gauges
 from softrobots.identification.identify import prior_of
+from softrobots.identification.measurement_checks import columns_of
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
@@ -80,7 +81,7 @@ def informative_poses(
         parameters: Names of what is to be identified, as for `identify`.
         candidates: What could be measured: `Measurements` with standard deviations, whose measured values do not matter (cells
             that are missing would be missing) and whose mask leaves out rows; or actuator coordinates, shape (candidates, m),
-            with `std` and `loads`.
+            or by name, as `Measurements` takes them, with `std` and `loads`.
         n: Number of poses to choose.
         std: With actuator coordinates: what is measured, with its standard deviation: "tip_position", "positions.NAME",
             "poses.NAME", "motor_torques"; by default the position of the tip to 1 mm.
@@ -150,6 +151,7 @@ def informative_poses(
 
 def _unmeasured(q_motors: Any, std: Mapping[str, Any], loads: Mapping[str, Any]) -> Measurements:
     """Candidates of actuator coordinates: what would be measured has the value 0."""
+    q_motors, names = columns_of("candidates", q_motors, None)
     motors = finite_array("candidates", q_motors, (None, None), "rad, m, N or Pa")
     zero: dict[str, Any] = {"positions": {}, "poses": {}}
     for key in std:
@@ -162,7 +164,7 @@ def _unmeasured(q_motors: Any, std: Mapping[str, Any], loads: Mapping[str, Any])
             zero[quantity][name] = np.tile(np.eye(4), (len(motors), 1, 1))
         else:
             raise NameNotFound("measured quantity", str(key), ["tip_position", "positions.NAME", "poses.NAME", "motor_torques"])
-    return Measurements(motors, **zero, std=std, **loads)
+    return Measurements(motors, **zero, std=std, **loads, actuators=names)
 
 
 def _rows(chosen: ParameterSet, measurements: Measurements) -> FloatArray:
@@ -170,7 +172,7 @@ def _rows(chosen: ParameterSet, measurements: Measurements) -> FloatArray:
     lacking = [key for key in measurements.measured if key not in measurements.std]
     if lacking:
         raise ParameterError("std", dict(measurements.std), f"given for all that is measured; it lacks {', '.join(lacking)}")
-    predictor = Predictor(chosen, measurements)
+    predictor = Predictor(chosen, measurements.in_order_of(chosen.present))
     predictor.refresh(chosen.values)
     prediction = predictor.at(chosen.values)
     parts = []

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray, finite_array, instance_of
+from softrobots.core.checks import FloatArray, by_column, finite_array, instance_of, stacked_columns
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
@@ -28,6 +28,32 @@ def by_name(name: str, values: Any) -> dict[str, Any]:
     found = {} if values is None else dict(instance_of(name, values, Mapping, "a mapping by name"))  # type: ignore[type-abstract]
     words_of(name, list(found), len(found), str)
     return found
+
+
+def columns_of(name: str, values: Any, names: Any) -> tuple[Any, Any]:
+    """Return an array of actuators and the names of its columns, of columns by name or rows by name; others as they came.
+
+    Args:
+        name: Name of the parameter, for errors.
+        values: Numbers, shape (n, m), columns by name, or a list of mappings, one a row.
+        names: Names that the columns have, in the order wanted; None: of `values` in its own order, if it has names.
+
+    Raises:
+        ParameterError: If a column is missing, or is not made of numbers.
+        NameNotFound: If there is another name.
+    """
+    columns = by_column(values)
+    if not isinstance(columns, Mapping):
+        return values, names
+    own = list(columns)
+    names = own if names is None else names
+    for one in own:
+        if one not in names:
+            raise NameNotFound("actuator of q_motors", one, names)
+    if len(own) < len(names):
+        raise ParameterError(name, values, f"numbers of {', '.join(names)}")
+    found = stacked_columns(name, columns, {one: "a column of numbers" for one in names})
+    return np.atleast_2d(found), names
 
 
 def words_of(name: str, values: Any, count: int, where: Callable[[int], str]) -> tuple[str, ...]:
@@ -158,7 +184,7 @@ def each_row_of(function: Any, first: dict[str, Any], *others: dict[str, Any]) -
     found: dict[str, Any] = {}
     for key, value in first.items():
         more = [one[key] for one in others if key in one]
-        if key in ("markers", "relative") or value is None:
+        if key in ("actuators", "markers", "relative") or value is None:
             found[key] = value
         elif isinstance(value, dict):
             found[key] = {name: function(one, *(other[name] for other in more)) for name, one in value.items()}

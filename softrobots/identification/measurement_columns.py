@@ -124,7 +124,7 @@ class Layout(NamedTuple):
 def read_columns(columns: Any) -> Layout:
     """Check a mapping of columns, as a dictionary or a YAML or JSON file.
 
-        actuators: {columns: [servo_4_mm, servo_3_mm, servo_9_mm], unit: mm, relative: true}
+        actuators: {columns: [servo_4_mm, servo_3_mm, servo_9_mm], unit: mm, relative: true}  # names: [...] in any order
         gravity: [0, 0, -9.81]                                            # m/s^2; or columns and a unit
         mass: {columns: hung_g, unit: g}
         positions: {tip: {columns: [tip_x, tip_y, tip_z], unit: mm, std: 1.0}}
@@ -172,6 +172,8 @@ def _layout(columns: Any) -> Layout:
         raise ParameterError("columns", list(entry), "a mapping with the entry 'actuators'")
     relative = entry["actuators"].get("relative", False)
     constants["relative"] = instance_of("columns.actuators.relative", relative, bool, "true or false")
+    if entry["actuators"].get("names") is not None:
+        constants["actuators"] = entry["actuators"]["names"]
     if entry.get("markers") is not None:
         constants["markers"] = _entry("columns.markers", entry["markers"])
     labels = entry.get("labels")
@@ -187,7 +189,13 @@ def _layout(columns: Any) -> Layout:
 def _group(where: str, key: str, name: str, value: Any) -> Group:
     """One entry with columns of numbers."""
     quantity, pose = QUANTITIES[key], key == "poses"
-    keys = ["columns", "unit", "scale", *(["std"] if quantity.measured else []), *(["relative"] if key == "actuators" else [])]
+    keys = [
+        "columns",
+        "unit",
+        "scale",
+        *(["std"] if quantity.measured else []),
+        *(["relative", "names"] if key == "actuators" else []),
+    ]
     entry = _entry(where, value, (*keys, *(("angle_unit", *ROTATIONS) if pose else ())))
     none = key == "actuators" and entry.get("columns") == []
     columns = () if none else _words(f"{where}.columns", entry.get("columns"), quantity.width)

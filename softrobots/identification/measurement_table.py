@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -12,10 +13,72 @@ from softrobots.core.bounded_reading import opened
 from softrobots.core.checks import FloatArray
 from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, NameNotFound, ParameterError, SoftRobotsError
-from softrobots.core.result_file import OWN_COLUMNS
+from softrobots.core.files import as_path
+from softrobots.core.result_file import OWN_COLUMNS, save_csv
 from softrobots.core.yaml_text import parse_yaml
 from softrobots.identification.measurement_columns import QUANTITIES, read_columns
 from softrobots.robots.parameter_file import LARGEST_FILE
+
+Made = TypeVar("Made", bound="MeasurementTables")
+
+
+class MeasurementTables:
+    """Measurements from tables and to tables: CSV files, pandas, mappings of columns."""
+
+    def __init__(self, q_motors: Any, **others: Any) -> None:
+        """Make them of arrays; see `Measurements`."""
+        raise NotImplementedError
+
+    @classmethod
+    def from_csv(cls: type[Made], path: str | os.PathLike[str], columns: Any = None) -> Made:
+        """Read measurements from a CSV file.
+
+        Its first line names the columns; empty lines and lines that begin with `#` are passed over, empty cells of what was
+        measured are missing.
+
+        Args:
+            path: The file, in UTF-8.
+            columns: Mapping of columns and units, or the path of a YAML or JSON file with it (`measurement_columns` tells its
+                form); None for files of `to_csv`, which tell their own.
+
+        Raises:
+            ParameterError: If `path` is no path, or the mapping is of another form or has another unit.
+            NameNotFound: If the mapping has an unknown entry.
+            FileFormatError: If a file cannot be read or is too large, lacks a column, or (naming the line) has a number that
+                is refused.
+        """
+        file = as_path("path", path)
+        arguments = read_rows(file, columns)
+        try:
+            return cls(**arguments)
+        except ParameterError as error:
+            raise FileFormatError(f"{file}: {error}") from error
+
+    @classmethod
+    def from_dataframe(cls: type[Made], table: Any, columns: Any = None) -> Made:
+        """Take measurements from a pandas table, or any mapping of names to columns.
+
+        Args:
+            table: The table.
+            columns: Mapping of columns and units, or the path of its file, as for `from_csv`; None for tables of
+                `to_dataframe`, which tell their own.
+
+        Raises:
+            ParameterError: If the mapping or a number is refused.
+            NameNotFound: If the table has no such column, or the mapping has an unknown entry.
+            FileFormatError: If the file of the mapping cannot be read.
+        """
+        return cls(**arguments_of_table(table, columns))
+
+    from_table = from_dataframe
+    """The first name of `from_dataframe`."""
+
+    def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
+        """Write a CSV file in SI units that `from_csv` reads to the last bit; its first line is a comment with the mapping.
+
+        The same as `softrobots.save_csv`, with its errors.
+        """
+        return save_csv(self, path, overwrite=overwrite)
 
 
 def read_rows(path: Path, columns: Any = None) -> dict[str, Any]:
@@ -88,6 +151,8 @@ def table_of(arguments: Mapping[str, Any]) -> tuple[dict[str, Sequence[Any]], di
                 entry["std"] = std[0].tolist() if np.all(std == std[0]) else add(f"std.{key}", std)
             mapping.setdefault(quantity, {}).update({name: entry} if name else entry)
     mapping["actuators"]["relative"] = arguments["relative"]
+    if arguments["actuators"] is not None:
+        mapping["actuators"]["names"] = list(arguments["actuators"])
     if arguments["labels"] is not None:
         table["label"], mapping["labels"] = arguments["labels"], "label"
     if not arguments["mask"].all():

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import os
 from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from types import MappingProxyType
 from typing import Any
 
@@ -14,9 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
-from softrobots.core.errors import FileFormatError, ParameterError
-from softrobots.core.files import as_path
-from softrobots.core.result_file import save_csv
+from softrobots.core.errors import ParameterError
 from softrobots.core.summary import Summarised
 from softrobots.identification.measured_robot import check_coordinates, frame_of, wrenches_on
 from softrobots.identification.measurement_checks import (
@@ -24,18 +20,19 @@ from softrobots.identification.measurement_checks import (
     by_name,
     check_modes,
     check_rows,
+    columns_of,
     deviations_of,
     each_row_of,
     labelled,
     with_gaps,
     words_of,
 )
-from softrobots.identification.measurement_table import arguments_of_table, read_rows
+from softrobots.identification.measurement_table import MeasurementTables
 from softrobots.model.soft_model import SoftModel, check_model
 
 
 @dataclass(frozen=True, eq=False, repr=False, init=False)
-class Measurements(Summarised):
+class Measurements(MeasurementTables, Summarised):
     """Measured rows of a robot at rest, in the order in which they were recorded; can be saved with `softrobots.save_result`.
 
     Arrays have a row for each measurement and are read-only. `measurements[rows]` selects rows, `+` joins two of the same form.
@@ -61,6 +58,8 @@ class Measurements(Summarised):
     """Whether `q_motors` holds pulls: the true coordinate is the relaxed length minus the pull."""
     lines: NDArray[np.int64] | None
     """Line of each row in the file it was read from, shape (n,)."""
+    actuators: tuple[str, ...] | None
+    """Name of each column of `q_motors` and motor torques; None: those of the robot, in its order."""
 
     def __init__(
         self,
@@ -83,11 +82,13 @@ class Measurements(Summarised):
         markers: Mapping[str, str] | None = None,
         relative: bool = False,
         lines: Any = None,
+        actuators: Any = None,
     ) -> None:
         """Check what was measured.
 
         Args:
-            q_motors: Commanded actuator coordinates, shape (n, m) [rad, m, N or Pa].
+            q_motors: Commanded actuator coordinates, shape (n, m), or columns by name of actuator, in any order, or a list of
+                mappings, one a row [rad, m, N or Pa].
             force: Force on the tip, shape (n, 3) [N].
             wrench: Wrench on the tip, shape (n, 6), or by frame [N, N m].
             mass: Mass hung at the tip, shape (n,) [kg]; needs `gravity`.
@@ -95,7 +96,8 @@ class Measurements(Summarised):
             tip_position: Position of the tip, shape (n, 3) [m]; short for `positions={"tip": ...}`.
             positions: Positions by frame or marker, each shape (n, 3) [m].
             poses: Poses by frame or marker, each shape (n, 4, 4) [m]; the rotation may be missing as a whole.
-            motor_torques: Load on each actuator, with the sign of `Equilibrium.motor_torques`, shape (n, m) [N m or N].
+            motor_torques: Load on each actuator, with the sign of `Equilibrium.motor_torques`, shape (n, m), or by name as
+                `q_motors` [N m or N].
             tensions: Tension of each muscle, shape (n, muscles) [N].
             frequencies: Lowest natural frequencies, slowest first, shape (n, k) [Hz]; e.g. of `ring_down`.
             damping_ratios: Damping ratios of the slowest modes, shape (n, k).
@@ -106,12 +108,16 @@ class Measurements(Summarised):
             markers: The frame on which each marker sits.
             relative: Whether `q_motors` holds pulls of actuators with a length, positive inwards [m].
             lines: Line of each row in a file, for errors, shape (n,).
+            actuators: Names of the columns of `q_motors`, if that is an array in another order than the robot's.
 
         Raises:
             ParameterError: If an argument has another form, a number is not finite (unless it was measured: NaN is missing), a
                 standard deviation or a frequency is not positive, or nothing was measured.
         """
+        q_motors, names = columns_of("q_motors", q_motors, actuators)
+        motor_torques, _ = columns_of("motor_torques", motor_torques, names or ())
         motors = finite_array("q_motors", q_motors, (None, None), "rad, m, N or Pa")
+        self._set("actuators", None if names is None else words_of("actuators", names, motors.shape[1], str))
         n = len(motors)
         if not n:
             raise ParameterError("q_motors", q_motors, "at least one row")
@@ -153,57 +159,6 @@ class Measurements(Summarised):
         self._set("markers", by_name("markers", markers))
         words_of("markers", [*self.markers.values()], len(self.markers), str)
         self._set("relative", instance_of("relative", relative, bool, "True or False"))
-
-    @classmethod
-    def from_csv(cls, path: str | os.PathLike[str], columns: Any = None) -> Measurements:
-        """Read measurements from a CSV file.
-
-        Its first line names the columns; empty lines and lines that begin with `#` are passed over, empty cells of what was
-        measured are missing.
-
-        Args:
-            path: The file, in UTF-8.
-            columns: Mapping of columns and units, or the path of a YAML or JSON file with it (`measurement_columns` tells its
-                form); None for files of `to_csv`, which tell their own.
-
-        Raises:
-            ParameterError: If `path` is no path, or the mapping is of another form or has another unit.
-            NameNotFound: If the mapping has an unknown entry.
-            FileFormatError: If a file cannot be read or is too large, lacks a column, or (naming the line) has a number that
-                is refused.
-        """
-        file = as_path("path", path)
-        arguments = read_rows(file, columns)
-        try:
-            return cls(**arguments)
-        except ParameterError as error:
-            raise FileFormatError(f"{file}: {error}") from error
-
-    @classmethod
-    def from_dataframe(cls, table: Any, columns: Any = None) -> Measurements:
-        """Take measurements from a pandas table, or any mapping of names to columns.
-
-        Args:
-            table: The table.
-            columns: Mapping of columns and units, or the path of its file, as for `from_csv`; None for tables of
-                `to_dataframe`, which tell their own.
-
-        Raises:
-            ParameterError: If the mapping or a number is refused.
-            NameNotFound: If the table has no such column, or the mapping has an unknown entry.
-            FileFormatError: If the file of the mapping cannot be read.
-        """
-        return cls(**arguments_of_table(table, columns))
-
-    from_table = from_dataframe
-    """The first name of `from_dataframe`."""
-
-    def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write a CSV file in SI units that `from_csv` reads to the last bit; its first line is a comment with the mapping.
-
-        The same as `softrobots.save_csv`, with its errors.
-        """
-        return save_csv(self, path, overwrite=overwrite)
 
     def __len__(self) -> int:
         """Return the number of rows."""
@@ -261,6 +216,8 @@ class Measurements(Summarised):
                 pulls are given of actuators without a length, or (naming the row) it cannot have such actuator coordinates.
             NameNotFound: If it has no such frame.
         """
+        if self.actuators is not None:
+            return self.in_order_of(model).check(model)
         actuators = check_model(model).actuators
         named = ", ".join(f"{name} [{unit}]" for name, unit in zip(actuators.names, actuators.units, strict=True))
         if self.q_motors.shape[1] != model.n_motors:
@@ -277,6 +234,21 @@ class Measurements(Summarised):
         for name in (*self.markers, *(key.partition(".")[2] for key in self.measured if "." in key)):
             frame_of(model, name, self.markers)
         check_coordinates(model, self.motor_coordinates(model), self.where)
+
+    def in_order_of(self, model: SoftModel) -> Measurements:
+        """Return the same with actuators in the order of a robot, if they have names.
+
+        Raises:
+            ParameterError: If an actuator is missing.
+            NameNotFound: If the robot has no actuator of a name.
+        """
+        if self.actuators is None:
+            return self
+        numbers = dict(zip(self.actuators, range(len(self.actuators)), strict=True))
+        order, found = check_model(model).actuators.in_order(numbers, "q_motors"), self.arguments() | {"actuators": None}
+        for values in (found, found["std"]):
+            values.update({key: values[key][:, order] for key in ("q_motors", "motor_torques") if key in values})
+        return Measurements(**found)
 
     def motor_coordinates(self, model: SoftModel) -> FloatArray:
         """Return actuator coordinates of a robot, shape (n, m): those commanded, or its relaxed lengths minus the pulls."""
@@ -297,4 +269,4 @@ class Measurements(Summarised):
         for key, values in (*self.loads.items(), *self.measured.items()):
             quantity, _, name = key.partition(".")
             found[quantity] = {**found.get(quantity, {}), name: values} if name else values
-        return found | {"markers": dict(self.markers), "relative": self.relative}
+        return found | {"markers": dict(self.markers), "relative": self.relative, "actuators": self.actuators}

@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, read_only
+from softrobots.core.checks import FloatArray, by_column, finite_array, read_only, stacked_columns
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.core.suspicion import question_angle, question_length
 from softrobots.description.urdf_tags import ActuatorTag
@@ -132,13 +132,15 @@ class Actuators:
         """Return values by name of actuator in the order of the actuators; anything else as it came.
 
         Args:
-            values: Number of each actuator by its name, or its numbers in many cases: a mapping, or a row or a table of pandas.
+            values: Number of each actuator by its name, or its numbers in many cases: a mapping, a list of mappings, or a row
+                or a table of pandas.
             field: Name of the parameter, for errors.
 
         Raises:
             NameNotFound: If there is no actuator of a name.
             ParameterError: If an actuator is missing; the errors list the actuators in order, with units and limits.
         """
+        values = by_column(values)
         names = list(values.keys()) if callable(getattr(values, "keys", None)) else None
         if names is None or (hasattr(values, "__array__") and not any(isinstance(name, str) for name in names)):
             return values
@@ -149,15 +151,7 @@ class Actuators:
         if missing:
             text = f"a number for each actuator; {', '.join(missing)} missing, of {', '.join(self.described)}"
             raise ParameterError(field, values, text)
-        if not names:
-            return np.zeros(0)
-        for name, described in zip(self.names, self.described, strict=True):
-            if np.asarray(values[name]).dtype.kind not in "fiu":
-                raise ParameterError(f"{field}[{name!r}]", values[name], f"a number: {described}")
-        try:
-            return np.stack(np.broadcast_arrays(*(values[name] for name in self.names)), axis=-1)
-        except ValueError as error:
-            raise ParameterError(field, values, "a number for each actuator, or as many for one as for another") from error
+        return stacked_columns(field, values, dict(zip(self.names, self.described, strict=False)))
 
     @cached_property
     def _unusual(self) -> tuple[float, ...]:
@@ -168,14 +162,18 @@ class Actuators:
         return tuple(np.where(self.turning, angles, np.where(slides & (sizes > 0.0), _FAR * sizes, np.inf)).tolist())
 
     def questioned(self, motors: FloatArray) -> FloatArray:
-        """Return positions, shape (n_motors,); warn (`SuspiciousInputWarning`) if they look like degrees or centimetres.
+        """Return positions as they are; warn once (`SuspiciousInputWarning`) if they look like degrees or centimetres.
 
         Joints without limits may turn many times: they are asked about whole numbers only, as degrees are typed.
+
+        Args:
+            motors: Positions, shape (n_motors,), or those of many cases, (n, n_motors), of which the farthest are looked at.
         """
-        if not any(map(gt, map(abs, motors.tolist()), self._unusual)):
+        one = motors if motors.ndim == 1 else _farthest(motors, min(self._unusual, default=np.inf))
+        if not any(map(gt, map(abs, one.tolist()), self._unusual)):
             return motors
-        for place in np.flatnonzero(np.abs(motors) > self._unusual).tolist():
-            value, usual, name = float(motors[place]), float(np.abs(self.limits[place]).max()), self.names[place]
+        for place in np.flatnonzero(np.abs(one) > self._unusual).tolist():
+            value, usual, name = float(one[place]), float(np.abs(self.limits[place]).max()), self.names[place]
             if not self.turning[place]:
                 question_length(name, value, usual)
             elif abs(value) <= _MOST_DEGREES and (math.isfinite(usual) or value == round(value)):
@@ -266,6 +264,13 @@ class Actuators:
             rows.append(normals)
             curvatures.append(bends)
         return np.concatenate(rows), np.concatenate(curvatures)
+
+
+def _farthest(rows: FloatArray, least: float) -> FloatArray:
+    """The number of each column that is farthest from zero, shape (m,), NaN left out; nothing if none is beyond the least."""
+    if not rows.size or (rows.min() >= -least and rows.max() <= least):
+        return np.zeros(0)
+    return np.array([max(np.fmin.reduce(column), np.fmax.reduce(column), key=abs) for column in rows.T])
 
 
 def _pairs(limits: Iterable[tuple[float, float]]) -> FloatArray:

@@ -109,7 +109,10 @@ class Actuation:
         return inputs
 
     def unsuited(self, motors: FloatArray) -> Any:
-        """Return a mask of the rows that no shape of the robot has or that are too large to compute with."""
+        """Return a mask of the rows that no shape of the robot has or that are too large to compute with.
+
+        It asks once about all rows that look like another unit.
+        """
         bad = np.zeros(len(motors), dtype=bool)
         joints = motors[:, : self._count]
         if joints.size and not (joints.min() >= -LARGEST_POSITION and joints.max() <= LARGEST_POSITION):
@@ -119,6 +122,7 @@ class Actuation:
         if self._lengths:
             admitted = (np.all(np.isfinite(row)) and self.model.actuators.admit(row) for row in motors)
             bad |= ~np.fromiter(admitted, dtype=bool, count=len(motors))
+        self.model.actuators.questioned(motors)
         return bad
 
     def checked(self, q_motors: Any, field: str = "q_motors") -> FloatArray:

@@ -140,7 +140,7 @@ class Course:
                 f"{name}[{key!r}]" if key else name: (one, size, unit) for key, one in several.items() if one is not None
             }
         self._columns = {name: _rows(name, *column) for name, column in columns.items()}
-        first.actuators.questioned(self._columns["q_motors"][0])
+        first.actuators.questioned(self._columns["q_motors"])
         counts = {name: len(rows) for name, rows in self._columns.items() if len(rows) > 1}
         count = len(given) if given is not None else max(counts.values(), default=1)
         for name, number in counts.items():
