@@ -12,6 +12,7 @@ from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
 
+_NOBODY = np.zeros(0, dtype=np.intp)
 INSIDE = 2
 """Feature of the minimum between the ends of a core; 0 and 1 are start and end, larger numbers crossed borders."""
 
@@ -54,50 +55,29 @@ def find_candidates(
     ends = places.ends.reshape(-1, 3).take(cores.single_ends, 0)
     limits = margin + cores.radii
     end_limits = limits.take(cores.end_capsules)[:, None]
-    found: list[_Found] = []
+    found: list[Candidates] = []
     for field, numbers in fields:
-        distances = field.distance(ends)
+        distances = field.at_least(ends)
         touching = distances <= end_limits
         if len(cores.at_base):
             _leave_out_base(touching, field, cores, ends, distances)
-        near, which = touching.nonzero()
-        one = other = near[:0]
-        if not isinstance(field, HalfSpaces):
+        if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
+            near, which = touching.nonzero()
+            new = _ends(field, cores, ends, near, which, distances[near, which], field.normals.take(which, 0))
+        else:
             # the distance changes by at most the length of the way: what is far at both ends is far between them
-            one, other = (
-                distances.take(cores.end_numbers, 0).sum(axis=1) <= (2.0 * limits + cores.long_ways)[:, None]
-            ).nonzero()
-        if len(near) or len(one):
-            of_ends = _ends(field, cores, ends, near, which, limits)
-            found.append(_with_inner(of_ends, places, one, other, limits, merged).numbered(numbers))
+            far = distances.take(cores.end_numbers, 0).sum(axis=1) > (2.0 * limits + cores.long_ways)[:, None]
+            new = _near(field, cores, places, ends, touching, (~far).nonzero(), limits, merged)
+        if len(new.capsules):
+            found.append(new._replace(obstacles=numbers.take(new.obstacles)))
     if pairs is not None:
         found.append(_own(cores, places, pairs, ends, limits, margin, merged, sum(len(numbers) for _, numbers in fields)))
-    parts = [(one.field, one.which) for one in found]
     if len(found) == 1:
-        return Candidates(parts, *found[0][2:])
+        return found[0]
     if not found:
-        nobody = np.zeros(0, dtype=np.intp)
-        return Candidates([], nobody, nobody, nobody, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
-    return Candidates(parts, *(np.concatenate(column) for column in zip(*(one[2:] for one in found), strict=True)))
-
-
-class _Found(NamedTuple):
-    """Candidates of one field; the rest as in `Candidates`."""
-
-    field: Field
-    which: Any
-    capsules: Any
-    obstacles: Any
-    features: Any
-    points: FloatArray
-    distances: FloatArray
-    normals: FloatArray
-
-    def numbered(self, numbers: Any) -> _Found:
-        return self._replace(obstacles=numbers.take(self.which))
-
-    def rows(self, chosen: Any) -> _Found:
-        return _Found(self.field, *(column.take(chosen, 0) for column in self[1:]))
+        return Candidates([], _NOBODY, _NOBODY, _NOBODY, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+    parts = [part for one in found for part in one.parts]
+    return Candidates(parts, *(np.concatenate(column) for column in zip(*(one[1:] for one in found), strict=True)))
 
 
 def _leave_out_base(touching: Any, field: Field, cores: Cores, ends: FloatArray, distances: FloatArray) -> None:
@@ -106,41 +86,66 @@ def _leave_out_base(touching: Any, field: Field, cores: Cores, ends: FloatArray,
     There the robot stands on the body, with a flat end: its capsules have caps, which are no contact.
     """
     rows, which = (distances.take(cores.bases, 0) < cores.base_radii).nonzero()
-    if len(rows):  # `distance` was a lower bound
+    if len(rows):  # `distances` are lower bounds
         inside = field.at(ends[cores.bases[rows]], which)[0] < cores.base_radii[rows, 0]
         touching[cores.at_base[rows[inside]], which[inside]] = False
 
 
-def _ends(field: Field, cores: Cores, ends: FloatArray, near: Any, which: Any, limits: FloatArray) -> _Found:
-    """Ends that are near bodies."""
-    capsules, points = cores.end_capsules.take(near), ends.take(near, 0)
-    values, normals = field.at(points, which)
-    found = _Found(field, which, capsules, which, cores.end_features.take(near), points, values, normals)
-    close = (values <= limits.take(capsules)).nonzero()[0]
-    return found if len(close) == len(values) else found.rows(close)  # `distance` was a lower bound
+def _ends(
+    field: Field, cores: Cores, ends: FloatArray, near: Any, which: Any, values: FloatArray, normals: FloatArray
+) -> Candidates:
+    """Ends `near` with their distances from the bodies `which`, and normals."""
+    capsules, features = cores.end_capsules.take(near), cores.end_features.take(near)
+    return Candidates([(field, which)], capsules, which, features, ends.take(near, 0), values, normals)
 
 
-def _with_inner(of_ends: _Found, places: CorePlaces, one: Any, other: Any, limits: FloatArray, merged: float) -> _Found:
-    """Add candidates inside of the cores `one` near the bodies `other`."""
+def _near(
+    field: Field,
+    cores: Cores,
+    places: CorePlaces,
+    ends: FloatArray,
+    touching: Any,
+    pairs: Any,
+    limits: FloatArray,
+    merged: float,
+) -> Candidates:
+    """Candidates at ends where `touching`, shape (ends, bodies), and inside of cores for `pairs` of core and body."""
+    (one, other), needed = pairs, touching
+    both = cores.end_numbers.take(one, 0), other[:, None]
+    if len(one):
+        needed = touching.copy()
+        needed[both] = True
+    near, which = needed.nonzero()
+    values, normals = field.at(ends.take(near, 0), which)
+    close = touching[near, which] & (values <= limits.take(cores.end_capsules.take(near)))
+    chosen = close.nonzero()[0]
+    at_ends = near.take(chosen), which.take(chosen), values.take(chosen), normals.take(chosen, 0)
+    found = _ends(field, cores, ends, *at_ends)
     if not len(one):
-        return of_ends
-    inner = core_points(
-        of_ends.field, other, places.ends.take(one, 0)[:, 0], places.spans.take(one, 0), limits.take(one), merged
-    )
+        return found
+    place = np.zeros(needed.shape, dtype=np.intp)
+    place[near, which] = np.arange(len(near))
+    known = values.take(place[both]), normals.take(place[both], 0)
+    starts, spans = places.ends[:, 0].take(one, 0), places.spans.take(one, 0)
+    inner = core_points(field, other, starts, spans, limits.take(one), merged, known)
+    if not len(inner.pairs):
+        return found
     which = other.take(inner.pairs)
-    new = (which, one.take(inner.pairs), which, INSIDE + inner.features, inner.points, inner.distances, inner.normals)
-    return _Found(of_ends.field, *(np.concatenate(pair) for pair in zip(of_ends[1:], new, strict=True)))
+    new = (one.take(inner.pairs), which, INSIDE + inner.features, inner.points, inner.distances, inner.normals)
+    columns = [np.concatenate(pair) for pair in zip(found[1:], new, strict=True)] if len(chosen) else new
+    return Candidates([(field, columns[1])], *columns)
 
 
 def _own(
     cores: Cores, places: CorePlaces, pairs: Any, ends: FloatArray, limits: FloatArray, margin: float, merged: float, count: int
-) -> _Found:
+) -> Candidates:
     """Candidates between the robot's own capsules, which are obstacles after the `count` of the environment."""
     field = own_capsules(cores, places)
     near = near_pairs(cores, places, pairs, margin)
-    touched = np.unique(np.concatenate([cores.end_numbers[near[:, 0], end] * cores.count + near[:, 1] for end in (0, 1)]))
-    found = _ends(field, cores, ends, touched // cores.count, touched % cores.count, limits)
+    touching = np.zeros((len(ends), cores.count), dtype=bool)
+    touching[cores.end_numbers[near[:, 0]], near[:, 1:]] = True
     long = near[cores.lengths[near[:, 0]] > 0.0]
-    found = _with_inner(found, places, long[:, 0], long[:, 1], limits, merged)
-    found = found.rows(different_contacts(cores, field, found.capsules, found.features, found.which, found.points))
-    return found._replace(obstacles=count + found.which)
+    found = _near(field, cores, places, ends, touching, (long[:, 0], long[:, 1]), limits, merged)
+    different = different_contacts(cores, field, found.capsules, found.features, found.obstacles, found.points)
+    capsules, which, *others = (column[different] for column in found[1:])
+    return Candidates([(field, which)], capsules, count + which, *others)

@@ -28,14 +28,17 @@ class Field(Protocol):
     def radii(self) -> FloatArray:
         """Distance of the surface from the features within, shape (n,) [m]."""
 
-    def distance(self, points: FloatArray) -> FloatArray:
-        """Distance of each point, shape (m, 3), from each body, or a lower bound of it outside, shape (m, n) [m]."""
+    def at_least(self, points: FloatArray) -> FloatArray:
+        """Lower bound of the distance of each point, shape (m, 3), from each body, shape (m, n) [m]; cheaper than `at`."""
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance, shape (m,) [m], and normal, shape (m, 3), at points, shape (m, 3)."""
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         r"""Directions `a`, shape (m, k, 3), and weights `c`, shape (m, k) [1/m]: :math:`H = \sum_k c_k\, a_k a_k^T`."""
+
+    def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distance and normal, and `t^T H t` of directions `t`, shape (m, 3): shape (m,) [1/m]."""
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Shares `s` of the way, shape (m, k), where `start + s span` crosses between features; any number if it does not."""
@@ -54,7 +57,7 @@ class HalfSpaces(NamedTuple):
         """Zero: planes."""
         return np.zeros(len(self.offsets))
 
-    def distance(self, points: FloatArray) -> FloatArray:
+    def at_least(self, points: FloatArray) -> FloatArray:
         """Distance of each point from each plane."""
         return np.asarray(points @ self.normals.T - self.offsets)
 
@@ -67,60 +70,104 @@ class HalfSpaces(NamedTuple):
         """Zero: planes."""
         return np.zeros((len(points), 0, 3)), np.zeros((len(points), 0))
 
+    def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distance, normal and zero."""
+        return *self.at(points, which), np.zeros(len(points))
+
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """None: one face."""
         return np.zeros((len(starts), 0))
 
 
-class RoundedBoxes(NamedTuple):
-    """Boxes with all points within a radius of them: boxes (radius 0), spheres (no size) and capsules (a length only)."""
+class _Around(NamedTuple):
+    """Capsules around bodies."""
 
-    rotations: FloatArray
-    """Axes, shape (n, 3, 3)."""
+    axes: FloatArray
+    """Directions of the straight parts, shape (n, 3)."""
     centres: FloatArray
     """Centres, shape (n, 3) [m]."""
     halves: FloatArray
-    """Half the edges, shape (n, 3) [m]."""
+    """Half the lengths of the straight parts, shape (n,) [m]."""
     radii: FloatArray
     """Radii, shape (n,) [m]."""
 
-    def _beyond(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Points in the axes of the bodies, how far they are beyond the faces, and the distance from the box."""
-        local = ((points - self.centres.take(which, 0))[..., None, :] @ self.rotations.take(which, 0))[..., 0, :]
+    def at_least(self, points: FloatArray) -> FloatArray:
+        """Distance of each point from each capsule."""
+        ways = points[:, None] - self.centres
+        along = np.abs(np.einsum("mni,ni->mn", ways, self.axes))
+        beyond = np.maximum(along - self.halves, 0.0)
+        squares = np.maximum(np.einsum("mni,mni->mn", ways, ways) - along * along, 0.0)
+        return np.asarray(np.sqrt(squares + beyond * beyond) - self.radii)
+
+
+class RoundedBoxes:
+    """Boxes with all points within a radius of them: boxes (radius 0), spheres (no size) and capsules (a length only)."""
+
+    def __init__(self, rotations: FloatArray, centres: FloatArray, halves: FloatArray, radii: FloatArray) -> None:
+        """Take the axes, shape (n, 3, 3), centres, shape (n, 3), half the edges, shape (n, 3), and radii, shape (n,) [m]."""
+        self.rotations, self.centres, self.halves, self.radii = rotations, centres, halves, radii
+        self._thin, self._faces = halves == 0.0, bool(halves.any())
+        rows, longest = np.arange(len(halves)), halves.argmax(axis=1)
+        others = np.sort(halves, axis=1)[:, :2]
+        around = radii + np.hypot(others[:, 0], others[:, 1])
+        self._around = _Around(rotations[rows, :, longest], centres, halves[rows, longest], around)
+
+    def _beyond(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+        """Points in the axes of the bodies, how far beyond the faces, the same or zero, and the distance from the box."""
+        local = ((points - self.centres.take(which, 0))[:, None] @ self.rotations.take(which, 0))[:, 0]
         beyond = np.abs(local) - self.halves.take(which, 0)
         outside = np.maximum(beyond, 0.0)
-        return local, beyond, np.sqrt(np.einsum("...i,...i", outside, outside))
+        return local, beyond, outside, np.sqrt(np.einsum("ij,ij->i", outside, outside))
 
-    def distance(self, points: FloatArray) -> FloatArray:
-        """Distance of each point from each body."""
-        _, beyond, outside = self._beyond(points[:, None, :], np.arange(len(self.radii)))
-        return np.asarray(outside + np.minimum(beyond.max(axis=-1), 0.0) - self.radii)
+    def at_least(self, points: FloatArray) -> FloatArray:
+        """Distance from a capsule around the body, exact for spheres and capsules."""
+        return self._around.at_least(points)
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance and normal."""
-        local, beyond, outside = self._beyond(points, which)
-        normal = np.maximum(beyond, 0.0) / np.maximum(outside, _TINY)[:, None]
-        distance = outside - self.radii.take(which)
-        within = (outside < _TINY).nonzero()[0]
+        return self._at(which, *self._beyond(points, which))
+
+    def _at(
+        self, which: Any, local: FloatArray, beyond: FloatArray, outside: FloatArray, distance: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Distance and normal from what `_beyond` returns."""
+        within = (distance < _TINY).nonzero()[0]
+        normal = outside / (np.maximum(distance, _TINY) if len(within) else distance)[:, None]
+        distance = distance - self.radii.take(which)
         if len(within):
             deepest = beyond[within].argmax(axis=1)
             normal[within, deepest] = 1.0
             distance[within] += beyond[within, deepest]
-        normal = np.copysign(normal, local)
-        return distance, (self.rotations.take(which, 0) @ normal[..., None])[..., 0]
+        return distance, (self.rotations.take(which, 0) @ np.copysign(normal, local)[:, :, None])[:, :, 0]
+
+    def _round(self, which: Any, beyond: FloatArray, distance: FloatArray) -> tuple[Any, FloatArray]:
+        """Coordinates that are beyond faces, shape (m, 3), and one over the distance, zero at faces, shape (m,) [1/m]."""
+        curved = (beyond > ON_BORDER * distance[:, None]) | self._thin.take(which, 0)
+        size = np.where((curved.sum(axis=1) > 1) & (distance > _TINY), 1.0 / np.maximum(distance, _TINY), 0.0)
+        return curved, size
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """One over the distance, in the coordinates that are beyond faces and across the normal; zero at faces."""
-        local, beyond, outside = self._beyond(points, which)
-        curved = (beyond > ON_BORDER * outside[:, None]) | (self.halves.take(which, 0) == 0.0)
-        size = np.where((curved.sum(axis=1) > 1) & (outside > _TINY), 1.0 / np.maximum(outside, _TINY), 0.0)[:, None]
-        rotations = self.rotations.take(which, 0)
-        normal = np.maximum(beyond, 0.0) * np.where(local < 0.0, -size, size)
+        local, beyond, outside, distance = self._beyond(points, which)
+        curved, size = self._round(which, beyond, distance)
+        size, rotations = size[:, None], self.rotations.take(which, 0)
+        normal = outside * np.where(local < 0.0, -size, size)
         directions = np.concatenate([rotations.swapaxes(1, 2), (rotations @ normal[:, :, None]).swapaxes(1, 2)], axis=1)
         return directions, np.concatenate([curved * size, -size], axis=1)
 
+    def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distance and normal, and the second derivative."""
+        found = self._beyond(points, which)
+        distance, normal = self._at(which, *found)
+        curved, size = self._round(which, found[1], found[3])
+        turned = (directions[:, None] @ self.rotations.take(which, 0))[:, 0]
+        slopes = np.einsum("ij,ij->i", normal, directions)
+        return distance, normal, size * (np.einsum("ij,ij->i", curved * turned, turned) - slopes * slopes)
+
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where the coordinates pass the faces."""
+        if not self._faces:
+            return np.zeros((len(starts), 0))
         rotations, halves = self.rotations.take(which, 0), self.halves.take(which, 0)
         local = ((starts - self.centres.take(which, 0))[:, None, :] @ rotations)[:, 0]
         along = (spans[:, None, :] @ rotations)[:, 0]
@@ -128,61 +175,89 @@ class RoundedBoxes(NamedTuple):
         return np.concatenate([(halves - local) / along, (-halves - local) / along], axis=1)
 
 
-class Cylinders(NamedTuple):
+class _BesideCylinder(NamedTuple):
+    """Points in the axes of cylinders."""
+
+    from_axis: FloatArray
+    """Distances from the axis, shape (m,) [m]."""
+    beyond: FloatArray
+    """How far they are beyond side and ends, shape (m, 2) [m]."""
+    outside: FloatArray
+    """Distances from the cylinder, zero inside, shape (m,) [m]."""
+    slopes: FloatArray
+    """Derivatives of the distance by the distance from the axis and beyond the ends, shape (m, 2)."""
+    outward: FloatArray
+    """Directions from the axis, shape (m, 3)."""
+    normal: FloatArray
+    """Normals, shape (m, 3)."""
+
+    @property
+    def distance(self) -> FloatArray:
+        """Signed distances, shape (m,) [m]."""
+        return np.asarray(self.outside + np.minimum(self.beyond.max(axis=1), 0.0))
+
+    @property
+    def curvatures(self) -> tuple[FloatArray, FloatArray]:
+        """Around the axis, and across the rim, zero elsewhere; both of shape (m,) [1/m]."""
+        positive = np.maximum(self.outside, _TINY)
+        across = np.where(self.outside > _TINY, self.slopes[:, 0] / np.maximum(self.from_axis, _TINY), 0.0)
+        rim = (self.beyond > ON_BORDER * self.outside[:, None]).all(axis=1) & (self.outside > _TINY)
+        return across, np.where(rim, 1.0 / positive, 0.0)
+
+
+class Cylinders:
     """Cylinders with flat ends."""
 
-    rotations: FloatArray
-    """Axes, z along the axis, shape (n, 3, 3)."""
-    centres: FloatArray
-    """Centres, shape (n, 3) [m]."""
-    halves: FloatArray
-    """Half the lengths, shape (n,) [m]."""
-    radii: FloatArray
-    """Radii, shape (n,) [m]."""
+    def __init__(self, rotations: FloatArray, centres: FloatArray, halves: FloatArray, radii: FloatArray) -> None:
+        """Take axes, z along the axis, shape (n, 3, 3), centres, shape (n, 3), half the lengths, and radii, shape (n,) [m]."""
+        self.rotations, self.centres, self.halves, self.radii = rotations, centres, halves, radii
+        self._around = _Around(rotations[:, :, 2], centres, halves, radii)
 
-    def _beyond(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-        """Points in the axes of the bodies, distances from the axis, and how far they are beyond side and ends, (..., 2)."""
-        local = ((points - self.centres.take(which, 0))[..., None, :] @ self.rotations.take(which, 0))[..., 0, :]
-        from_axis = np.hypot(local[..., 0], local[..., 1])
-        beyond = np.stack([from_axis - self.radii.take(which), np.abs(local[..., 2]) - self.halves.take(which)], axis=-1)
-        outside = np.maximum(beyond, 0.0)
-        return local, from_axis, beyond, np.sqrt(np.einsum("...i,...i", outside, outside))
+    def _beyond(self, points: FloatArray, which: Any) -> _BesideCylinder:
+        """Points in the axes of the bodies."""
+        local = ((points - self.centres.take(which, 0))[:, None] @ self.rotations.take(which, 0))[:, 0]
+        from_axis, beyond = np.hypot(local[:, 0], local[:, 1]), np.zeros((len(points), 2))
+        beyond[:, 0] = from_axis - self.radii.take(which)
+        beyond[:, 1] = np.abs(local[:, 2]) - self.halves.take(which)
+        slopes = np.maximum(beyond, 0.0)
+        outside = np.sqrt(np.einsum("ij,ij->i", slopes, slopes))
+        slopes /= np.maximum(outside, _TINY)[:, None]
+        within = (outside < _TINY).nonzero()[0]
+        slopes[within, beyond[within].argmax(axis=1)] = 1.0
+        outward = (local * _RADIAL) / np.maximum(from_axis, _TINY)[:, None]
+        outward[:, 0] += from_axis < _TINY  # on the axis: any direction across
+        normal = slopes[:, :1] * outward
+        normal[:, 2] = np.copysign(slopes[:, 1], local[:, 2])
+        return _BesideCylinder(from_axis, beyond, outside, slopes, outward, normal)
 
-    def distance(self, points: FloatArray) -> FloatArray:
-        """Distance of each point from each body."""
-        _, _, beyond, outside = self._beyond(points[:, None, :], np.arange(len(self.radii)))
-        return np.asarray(outside + np.minimum(beyond.max(axis=-1), 0.0))
-
-    def _slopes(self, beyond: FloatArray, outside: FloatArray) -> FloatArray:
-        """Derivatives of the distance by the distance from the axis and beyond the ends, shape (m, 2)."""
-        inside = np.eye(2)[beyond.argmax(axis=1)]
-        return np.where((outside < _TINY)[:, None], inside, np.maximum(beyond, 0.0) / np.maximum(outside, _TINY)[:, None])
+    def at_least(self, points: FloatArray) -> FloatArray:
+        """Distance from a capsule around the body."""
+        return self._around.at_least(points)
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance and normal."""
-        local, from_axis, beyond, outside = self._beyond(points, which)
-        slopes = self._slopes(beyond, outside)
-        normal = local * (slopes[:, 0] / np.maximum(from_axis, _TINY))[:, None]
-        normal[:, 0] += slopes[:, 0] * (from_axis < _TINY)  # on the axis: any direction across
-        normal[:, 2] = np.where(local[:, 2] < 0.0, -slopes[:, 1], slopes[:, 1])
-        return outside + np.minimum(beyond.max(axis=1), 0.0), (self.rotations.take(which, 0) @ normal[..., None])[..., 0]
+        found = self._beyond(points, which)
+        return found.distance, (self.rotations.take(which, 0) @ found.normal[:, :, None])[:, :, 0]
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Around the axis at side and rim, and across the rim."""
-        local, from_axis, beyond, outside = self._beyond(points, which)
-        slopes = self._slopes(beyond, outside)
-        rotations = self.rotations.take(which, 0)
-        outward = (local * _RADIAL) / np.maximum(from_axis, _TINY)[:, None]
-        outward[:, 0] += from_axis < _TINY
-        normal = slopes[:, :1] * outward
-        normal[:, 2] = np.where(local[:, 2] < 0.0, -slopes[:, 1], slopes[:, 1])
+        found = self._beyond(points, which)
+        outward, (across, size) = found.outward, found.curvatures
         around = np.stack([-outward[:, 1], outward[:, 0], outward[:, 2]], axis=1)
         axes = np.broadcast_to(_AXIS, outward.shape)
-        across = np.where(outside > _TINY, slopes[:, 0] / np.maximum(from_axis, _TINY), 0.0)
-        rim = (beyond > ON_BORDER * outside[:, None]).all(axis=1) & (outside > _TINY)
-        size = np.where(rim, 1.0 / np.maximum(outside, _TINY), 0.0)
-        directions = np.stack([around, outward, axes, normal], axis=1) @ rotations.swapaxes(1, 2)
+        directions = np.stack([around, outward, axes, found.normal], axis=1) @ self.rotations.take(which, 0).swapaxes(1, 2)
         return directions, np.stack([across, size, size, -size], axis=1)
+
+    def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distance and normal, and the second derivative."""
+        found, rotations = self._beyond(points, which), self.rotations.take(which, 0)
+        outward, (across, size) = found.outward, found.curvatures
+        turned = (directions[:, None] @ rotations)[:, 0]
+        radial, axial = np.einsum("ij,ij->i", outward, turned), turned[:, 2]
+        around = outward[:, 0] * turned[:, 1] - outward[:, 1] * turned[:, 0]
+        slopes = np.einsum("ij,ij->i", found.normal, turned)
+        bend = across * around * around + size * (radial * radial + axial * axial - slopes * slopes)
+        return found.distance, (rotations @ found.normal[:, :, None])[:, :, 0], bend
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where it passes the planes of the ends, and the side."""

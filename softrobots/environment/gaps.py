@@ -47,18 +47,31 @@ class MaterialPoints(NamedTuple):
 class Gaps:
     """Candidates of contact at one configuration; rows are candidates, in no order of size."""
 
-    def __init__(self, cores: Cores, places: CorePlaces, found: Candidates, transforms: FloatArray, reach: float) -> None:
-        """Take the candidates, the transforms of the obstacles to the world, shape (n, 4, 4), and the reach [m]."""
+    def __init__(
+        self, cores: Cores, places: CorePlaces, found: Candidates, transforms: FloatArray, reach: float, own: bool
+    ) -> None:
+        """Take candidates, transforms of obstacles to the world, shape (n, 4, 4), reach [m]; may the robot touch itself?"""
         self.capsules, self.obstacles, self.features = found.capsules, found.obstacles, found.features
         """Capsule, obstacle and feature of each candidate, shape (m,), integers. Numbers of obstacles beyond the last are
         capsules of the robot itself: the number less that of obstacles."""
         self.core_points, self.normals = found.points, found.normals
         """Material points of the cores, and normals from obstacle to robot, shape (m, 3)."""
-        self.radii: FloatArray = cores.radii[found.capsules]
+        self.radii: FloatArray = cores.radii.take(found.capsules)
         """Radii of the capsules, shape (m,) [m]."""
         self.values: FloatArray = found.distances - self.radii
         """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
         self._cores, self.places, self.parts, self._transforms, self._reach = cores, places, found.parts, transforms, reach
+        self._own = own
+        self.moves: FloatArray = cores.moves.take(found.capsules, 0)
+        """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
+
+        Where the robot touches itself, less that of the other capsule."""
+        if own:
+            rows = (found.obstacles >= len(transforms)).nonzero()[0]
+            self.moves[rows] -= cores.moves[found.obstacles[rows] - len(transforms)]
+        wrenches = np.concatenate([found.normals, cross(found.points, found.normals)], axis=1)
+        self.jacobian: FloatArray = wrenches.dot(places.jacobian) * self.moves
+        """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
 
     def __len__(self) -> int:
         """Number of candidates."""
@@ -78,33 +91,6 @@ class Gaps:
     def keys(self) -> tuple[tuple[int, int, int], ...]:
         """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next."""
         return tuple(zip(self.capsules.tolist(), self.obstacles.tolist(), self.features.tolist(), strict=True))
-
-    @cached_property
-    def moves(self) -> FloatArray:
-        """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
-
-        Where the robot touches itself, less that of the other capsule.
-        """
-        moves = self._cores.moves.take(self.capsules, 0)
-        own = self._own_rows
-        if len(own):
-            moves[own] -= self._cores.moves[self.obstacles[own] - len(self._transforms)]
-        return np.asarray(moves)
-
-    @cached_property
-    def _own_rows(self) -> Any:
-        """Candidates of the robot with itself."""
-        return (self.obstacles >= len(self._transforms)).nonzero()[0]
-
-    @cached_property
-    def jacobian(self) -> FloatArray:
-        """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
-        return self._rows(slice(None), self.normals, self.core_points, 0.0)
-
-    def _rows(self, rows: Any, directions: FloatArray, points: FloatArray, couples: Any) -> FloatArray:
-        """Work of forces, shape (k, 3), at points of the cores, and of couples, per joint rate, shape (k, nv)."""
-        wrenches = np.concatenate([directions, cross(points, directions) + couples], axis=1)
-        return np.asarray(wrenches.dot(self.places.jacobian) * self.moves[rows])
 
     def point_jacobian(self, rows: Any, points: FloatArray) -> FloatArray:
         """Velocity of material points of the robot per joint rate; where it touches itself, relative to the other capsule.
@@ -139,7 +125,7 @@ class Gaps:
             vectors = vectors[:, None] * normals
         else:
             points = points - self.radii.take(rows)[:, None] * normals
-        if len(self._own_rows):  # the other capsule takes the opposite force
+        if self._own:  # the other capsule takes the opposite force
             chosen = np.flatnonzero(self.obstacles[rows] >= len(self._transforms))
             own, others = rows[chosen], self.obstacles[rows[chosen]] - len(self._transforms)
             depths = self._cores.radii[others] if normal else np.zeros(len(own))
@@ -148,13 +134,13 @@ class Gaps:
         jacobian, moves = self.places.jacobian, moves[:, None, :]
         linear, angular = (jacobian[:3] - skew(points) @ jacobian[3:]) * moves, jacobian[3:] * moves
         return JointLoad(
-            torque=vectors.reshape(-1).dot(linear.reshape(-1, nv)),
+            torque=vectors.ravel().dot(linear.reshape(-1, nv)),
             angular=angular.reshape(-1, nv),
-            by_force=(skew(vectors).swapaxes(1, 2) @ linear).reshape(-1, nv),
+            by_force=(skew(-vectors) @ linear).reshape(-1, nv),
             by_moment=None,
             gravity_derivative=None,
-            potential=-float(vectors.reshape(-1).dot(points.reshape(-1))),
-            scale=self._reach * float(np.sqrt((vectors * vectors).sum(axis=1)).sum()),
+            potential=-float(vectors.ravel().dot(points.ravel())),
+            scale=self._reach * float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)).sum()),
         )
 
     def curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -167,38 +153,43 @@ class Gaps:
             Rows, shape (k, nv), and weights, shape (k,) [N/m]: :math:`\sum f_i\, d^2 g_i` is the derivative of the torque of
             `load(forces)` plus `rows.T @ diag(weights) @ rows`.
         """
-        nv = self.places.jacobian.shape[1]
-        found, weights, first = [np.zeros((0, nv))], [np.zeros(0)], 0
+        nv, first = self.places.jacobian.shape[1], 0
+        found, weights = list[FloatArray](), list[FloatArray]()
         for field, which in self.parts:
             if not isinstance(field, HalfSpaces):
                 rows = first + forces[first : first + len(which)].nonzero()[0]
                 if len(rows) and self.obstacles[first] >= len(self._transforms):
                     self._curved_by_itself(rows, forces, found, weights)
                 elif len(rows):
-                    self._curved(field, which[rows - first], rows, forces[rows], found, weights)
+                    self._curved(field, which.take(rows - first), rows, forces.take(rows), found, weights)
             first += len(which)
-        if len(found) == 1:
-            return found[0], weights[0]
-        return np.concatenate(found), np.concatenate(weights)
+        if not found:
+            return np.zeros((0, nv)), np.zeros(0)
+        return (found[0], weights[0]) if len(found) == 1 else (np.concatenate(found), np.concatenate(weights))
 
     def _curved(self, field: Field, which: Any, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
         """Append the terms of the candidates of one field."""
-        points, normals = self.core_points[rows], self.normals[rows]
+        points = self.core_points.take(rows, 0)
         directions, curvatures = field.curvature(points, which)
         bent, place = curvatures.nonzero()
         if not len(bent):
             return
+        velocity = self.point_jacobian(rows, points)
+        found.append((directions @ velocity)[bent, place])
+        weights.append((forces[:, None] * curvatures)[bent, place])
+        inside = (self.features.take(rows) == INSIDE).nonzero()[0]
+        if not len(inside):
+            return
+        rows, directions = rows.take(inside), directions.take(inside, 0)
         spans = self.places.spans.take(self.capsules.take(rows), 0)
-        parts = curvatures * (directions @ spans[:, :, None])[:, :, 0]
-        pulls = np.einsum("ij,ijk->ik", parts, directions)  # H t
+        parts = curvatures.take(inside, 0) * (directions @ spans[:, :, None])[:, :, 0]
+        pulls = (parts[:, None] @ directions)[:, 0]  # H t
         bend = np.einsum("ij,ij->i", pulls, spans)
-        slides = ((self.features.take(rows) == INSIDE) & (bend > 0.0)).nonzero()[0]
-        couples = np.zeros((len(bent) + len(slides), 3))
-        couples[len(bent) :] = cross(spans.take(slides, 0), normals.take(slides, 0))
-        which_rows = np.concatenate([bent, slides])
-        along = np.concatenate([directions[bent, place], pulls.take(slides, 0)])
-        found.append(self._rows(rows.take(which_rows), along, points.take(which_rows, 0), couples))
-        weights.append(np.concatenate([forces[bent] * curvatures[bent, place], -forces[slides] / bend[slides]]))
+        slides = (bend > 0.0).nonzero()[0]
+        if len(slides):
+            turned = cross(spans, self.normals.take(rows, 0)).dot(self.places.jacobian[3:]) * self.moves.take(rows, 0)
+            found.append(((pulls[:, None] @ velocity.take(inside, 0))[:, 0] + turned).take(slides, 0))
+            weights.append((-forces.take(inside) / np.where(bend > 0.0, bend, 1.0)).take(slides))
 
     def _curved_by_itself(self, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
         """Append the terms of candidates of the robot with itself."""
@@ -258,7 +249,7 @@ class Surroundings:
             DescriptionError: If the robot has no capsules, and no collision shapes that are spheres or cylinders.
         """
         check_environment(environment)
-        self._cores = cores_of(model)
+        self._cores, self._itself = cores_of(model), environment.self_contact
         self._pairs = self_contact_pairs(model, self._cores) if environment.self_contact else None
         self._fields, self._transforms = obstacle_fields(environment), obstacle_transforms(environment)
         self._reach = model.reach
@@ -282,4 +273,4 @@ class Surroundings:
         """
         places = self._cores.at(q)
         found = find_candidates(self._cores, places, self._fields, self._pairs, margin, SAME_POINT * self._reach)
-        return Gaps(self._cores, places, found, self._transforms, self._reach)
+        return Gaps(self._cores, places, found, self._transforms, self._reach, self._itself)

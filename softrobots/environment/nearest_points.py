@@ -20,7 +20,7 @@ _ROUND = 0.1
 
 
 _NARROW = 1e-15
-_BOTH = np.array([0, 1])
+_BOTH, _ENDS = np.array([0, 1]), np.array([[0.0, 1.0]])
 
 
 class CorePoints(NamedTuple):
@@ -38,11 +38,18 @@ class CorePoints(NamedTuple):
     """Normals, shape (m, 3)."""
 
 
-NO_POINTS = CorePoints(*(np.zeros(0, dtype=np.intp),) * 2, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+_NOBODY = np.zeros(0, dtype=np.intp)
+NO_POINTS = CorePoints(_NOBODY, _NOBODY, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
 
 
 def core_points(
-    field: Field, which: Any, starts: FloatArray, spans: FloatArray, limits: FloatArray, merged: float
+    field: Field,
+    which: Any,
+    starts: FloatArray,
+    spans: FloatArray,
+    limits: FloatArray,
+    merged: float,
+    at_ends: tuple[FloatArray, FloatArray] | None = None,
 ) -> CorePoints:
     r"""Minima of the distance inside of straight cores, and crossings of borders between features.
 
@@ -56,53 +63,63 @@ def core_points(
         spans: From start to end of the cores, shape (m, 3) [m].
         limits: Distance of interest of each pair, shape (m,) [m].
         merged: Distance from an end of the core within which a candidate is that end [m].
+        at_ends: Distances, shape (m, 2) [m], and normals, shape (m, 2, 3), of the two ends, where they are known.
 
     Returns:
         The candidates.
     """
+    if at_ends is None:
+        both = field.at(np.stack([starts, starts + spans], axis=1).reshape(-1, 3), which.repeat(2))
+        at_ends = both[0].reshape(-1, 2), both[1].reshape(-1, 2, 3)
     length = np.sqrt(np.einsum("ij,ij->i", spans, spans))
+    along = spans / length[:, None]
+    distances, slopes, shares = at_ends[0], (at_ends[1] @ along[:, :, None])[:, :, 0], _ENDS
     borders = field.borders(starts, spans, which)
     crossed = (borders > 0.0) & (borders < 1.0)
     used = np.asarray(crossed.any(axis=0)).nonzero()[0]
-    shares = np.zeros((len(which), len(used) + 2))
-    shares[:, -1] = 1.0
-    borders = np.where(crossed, borders, 1.0).take(used, 1)
-    order = borders.argsort(axis=1)
-    shares[:, 1:-1] = np.sort(borders, axis=1)
-    points = starts[:, None] + shares[:, :, None] * spans[:, None]
-    flat = field.at(points.reshape(-1, 3), which.repeat(shares.shape[1]))
-    distances, normals = flat[0].reshape(shares.shape), flat[1].reshape(points.shape)
-    slopes = np.einsum("ijk,ik->ij", normals, spans) / length[:, None]
-    ways = shares[:, 1:-1] * length[:, None]
-    keep = (ways > merged) & (ways < length[:, None] - merged) & (distances[:, 1:-1] <= limits[:, None])
+    if len(used):
+        borders = np.where(crossed, borders, 1.0).take(used, 1)
+        order = borders.argsort(axis=1)
+        borders = np.sort(borders, axis=1)
+        points = starts[:, None] + borders[:, :, None] * spans[:, None]
+        flat = field.at(points.reshape(-1, 3), which.repeat(len(used)))
+        inner, normals = flat[0].reshape(borders.shape), flat[1].reshape(points.shape)
+        ways = borders * length[:, None]
+        keep = (ways > merged) & (ways < length[:, None] - merged) & (inner <= limits[:, None])
+        distances, slopes = _between(distances, inner), _between(slopes, (normals @ along[:, :, None])[:, :, 0])
+        shares = _between(np.broadcast_to(_ENDS, (len(which), 2)), borders)
 
     found = NO_POINTS
     rows = ((slopes[:, 0] < 0.0) & (slopes[:, -1] > 0.0)).nonzero()[0]
     if len(rows):
+        bodies, begins, ways, lengths = which.take(rows), starts.take(rows, 0), spans.take(rows, 0), length.take(rows)
         place = (slopes.take(rows, 0) < 0.0).sum(axis=1) - 1
-        entries = (rows * shares.shape[1] + place)[:, None] + _BOTH
-        tables = (column.ravel().take(entries) for column in (shares, slopes, distances))
-        bodies, begins, ways = which.take(rows), starts.take(rows, 0), spans.take(rows, 0)
-        share, distance, normal, bend = _minimum(field, bodies, begins, ways, length.take(rows), *tables)
+        entries = (rows * slopes.shape[1] + place)[:, None] + _BOTH
+        bracket = shares.take(entries if len(used) else _BOTH[None].repeat(len(rows), 0))
+        tables = bracket, slopes.take(entries), distances.take(entries)
+        share, points_there, distance, normal, bend = _minimum(field, bodies, begins, ways, lengths, *tables)
         round_here = bend * (np.maximum(distance, 0.0) + field.radii.take(bodies))
-        way = share * length.take(rows)
-        unique = (way > merged) & (way < length.take(rows) - merged) & ((round_here > _PARALLEL) | (distance <= merged))
+        way = share * lengths
+        unique = (way > merged) & (way < lengths - merged) & ((round_here > _PARALLEL) | (distance <= merged))
         for border in (place - 1, place) if len(used) else ():  # before and after the minimum
             at = np.minimum(np.maximum(border, 0), len(used) - 1)
-            apart = np.abs(shares[rows, at + 1] - share) * length.take(rows)
+            apart = np.abs(shares[rows, at + 1] - share) * lengths
             stands = unique & ((apart <= merged) | ((apart <= 0.5 * distance) & (round_here > _ROUND)))
             keep[rows, at] &= ~stands
         good = (unique & (distance <= limits.take(rows))).nonzero()[0]
-        points_there = (begins + share[:, None] * ways).take(good, 0)
         zeros = np.zeros(len(good), dtype=np.intp)
-        found = CorePoints(rows.take(good), zeros, points_there, distance.take(good), normal.take(good, 0))
-    pairs, columns = keep.nonzero()
+        found = CorePoints(rows.take(good), zeros, points_there.take(good, 0), distance.take(good), normal.take(good, 0))
+    pairs, columns = keep.nonzero() if len(used) else (_NOBODY, _NOBODY)
     if not len(pairs):
         return found
     features = 1 + used[order[pairs, columns]]
-    columns = columns + 1
-    crossings = CorePoints(pairs, features, points[pairs, columns], distances[pairs, columns], normals[pairs, columns])
+    crossings = CorePoints(pairs, features, points[pairs, columns], inner[pairs, columns], normals[pairs, columns])
     return CorePoints(*(np.concatenate(both) for both in zip(found, crossings, strict=True))) if len(found.pairs) else crossings
+
+
+def _between(ends: FloatArray, inner: FloatArray) -> FloatArray:
+    """Values at both ends, shape (m, 2), with others between them, shape (m, k)."""
+    return np.concatenate([ends[:, :1], inner, ends[:, 1:]], axis=1)
 
 
 def _minimum(
@@ -114,7 +131,7 @@ def _minimum(
     shares: FloatArray,
     slopes: FloatArray,
     distances: FloatArray,
-) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray, FloatArray]:
     """Find the minimum along each core by Newton steps within a bracket of its share, by bisection where they leave it.
 
     Args:
@@ -128,26 +145,27 @@ def _minimum(
         distances: Distances there, shape (m, 2) [m].
 
     Returns:
-        Share, distance [m], normal and curvature of the distance along the core [1/m] at the minimum.
+        Share, point [m], distance [m], normal and curvature of the distance along the core [1/m] at the minimum.
     """
-    along = spans / length[:, None]
-    lower, upper = shares.T.copy()
+    along, lower, upper = spans / length[:, None], shares[:, 0], shares[:, 1]
     # slope times distance from a corner or a straight edge is linear along the core
     guess = slopes * (distances + field.radii.take(which)[:, None])
-    if not (guess[:, 1] > guess[:, 0]).all():
-        guess = slopes
-    share = lower - (upper - lower) * guess[:, 0] / (guess[:, 1] - guess[:, 0])
+    rise = guess[:, 1] - guess[:, 0]
+    if not (rise > 0.0).all():
+        guess, rise = slopes, slopes[:, 1] - slopes[:, 0]
+    share = lower - (upper - lower) * guess[:, 0] / rise
     for _ in range(_MAX_ITERATIONS):
         points = starts + share[:, None] * spans
-        distance, normal = field.at(points, which)
+        distance, normal, bend = field.along(points, which, along)
         slope = np.einsum("ij,ij->i", normal, along)
-        directions, weights = field.curvature(points, which)
-        bend = np.einsum("ij,ij->i", weights, (directions @ along[:, :, None])[:, :, 0] ** 2)
+        waiting = np.abs(slope) > _SLOPE
+        if not waiting.any():
+            break
         lower, upper = np.where(slope < 0.0, share, lower), np.where(slope > 0.0, share, upper)
-        waiting = (np.abs(slope) > _SLOPE) & (upper - lower > _NARROW)
+        waiting &= upper - lower > _NARROW
         if not waiting.any():
             break
         trial = share - slope / (np.where(bend > 0.0, bend, np.inf) * length)
         trial = np.where((bend > 0.0) & (trial > lower) & (trial < upper), trial, 0.5 * (lower + upper))
         share = np.where(waiting, trial, share)
-    return share, distance, normal, bend
+    return share, points, distance, normal, bend

@@ -31,7 +31,7 @@ class Polyhedra:
         self._request, self._there, self._result = coal.DistanceRequest(), coal.Transform3s(), coal.DistanceResult()
         self._request.gjk_tolerance = _TOLERANCE
 
-    def distance(self, points: FloatArray) -> FloatArray:
+    def at_least(self, points: FloatArray) -> FloatArray:
         """Largest distance from the planes of the faces: the distance inside and at faces, else a lower bound of it."""
         found = np.zeros((len(points), len(self.hulls)))
         for place, hull in enumerate(self.hulls):
@@ -55,6 +55,12 @@ class Polyhedra:
                 directions[row] = across, cross(near.normal, across)
                 curvatures[row] = 1.0 / near.distance, 1.0 / near.distance if near.rank > 2 else 0.0
         return directions, curvatures
+
+    def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Distance and normal, and the second derivative."""
+        axes, curvatures = self.curvature(points, which)
+        turned = (axes @ directions[:, :, None])[:, :, 0]
+        return *self.at(points, which), (curvatures * turned * turned).sum(axis=1)
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where the nearest point passes from a face to an edge (two columns an edge), or from an edge to a corner (two)."""

@@ -222,7 +222,7 @@ def read_environment_file(file: Path) -> None:
     """Obstacles, and their distances from a point."""
     environment = sr.Environment.from_file(file)
     for field, _ in obstacle_fields(environment):
-        finite(*field.distance(np.array([[3.0, 2.0, 1.0]])))
+        finite(*field.at_least(np.array([[3.0, 2.0, 1.0]])))
 
 
 def command_corpus() -> list[bytes]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.statics.contact.quadratic_programme import solve_programme
+from softrobots.statics.contact.quadratic_programme import solve_guessed, solve_programme
 from softrobots.statics.elastic_state import norm, positive, scaled
 
 _LEAST = 1e-3  # least curvature along which a step is taken, relative to the springs
@@ -65,7 +65,9 @@ def contact_step(
     if damping:
         relative = relative + damping * np.eye(len(soft))
     convex, shift, exact = _convex(relative, gaps, gradients, held, factors)
-    found = solve_programme(convex, pull if shift is None else pull + shift, gradients, -gaps)
+    found = solve_guessed(factors, pull, gradients, -gaps, held) if convex is relative else None
+    if found is None:
+        found = solve_programme(convex, pull if shift is None else pull + shift, gradients, -gaps)
     if found is not None and shift is not None and shift.any():
         lost = 2.0 * float(found[1].sum()) * max(-float(gaps.min(initial=0.0)), 0.0)
         if not np.array_equal(found[1] > 0.0, held) or float(pull @ found[0]) > lost:  # other contacts are pressed, or uphill

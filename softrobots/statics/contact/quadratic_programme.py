@@ -16,6 +16,7 @@ _TIGHT = {"primal_tol": 1e-13, "dual_tol": 1e-13}
 _FREE = 1e30  # bound that does not bind
 _MANY = 16  # rows beyond which they are taken in one after another
 _BROKEN = 1e-13  # of a row by its size
+_INDEPENDENT = 1e-6  # least eigenvalue of the products of rows of size 1 that are solved for at once
 _SOLVED, _EQUALITY = 1, 5  # exit flag and kind of constraint of daqp
 
 
@@ -35,6 +36,47 @@ def solve_programme(
     if len(bounds) > _MANY and equal is None:
         return _by_rows(hessian, pull, gradients, bounds, box)
     return _solved(hessian, pull, gradients, bounds, equal, box)
+
+
+def solve_guessed(
+    factors: Any, pull: FloatArray, gradients: FloatArray, bounds: FloatArray, held: Any
+) -> tuple[FloatArray, FloatArray] | None:
+    """The same in closed form, where the rows that are equations can be guessed: those of `held`, else the one broken most.
+
+    Args:
+        factors: Factors of the Hessian, an `eigenpy.LDLT`.
+        pull: As in `solve_programme`, like gradients and bounds.
+        gradients: Constraints.
+        bounds: Their bounds.
+        held: Rows that may be equations, shape (m,), truth values.
+
+    Returns:
+        As `solve_programme`; None if the guess is wrong, or the rows nearly depend on each other.
+    """
+    solution, multipliers = -factors.solve(pull).ravel(), np.zeros(len(bounds))  # Eigen returns one row as a matrix
+    lacking = bounds - gradients.dot(solution)
+    chosen = held.nonzero()[0]
+    if not len(chosen):
+        chosen = lacking.argmax(keepdims=True) if len(lacking) else chosen
+        if not len(chosen) or lacking[chosen[0]] <= 0.0:
+            return solution, multipliers
+    rows, lacking = gradients.take(chosen, 0), lacking.take(chosen)
+    gives = factors.solve(rows.T).reshape(len(pull), -1)
+    across = rows.dot(gives)
+    if len(chosen) == 1:
+        forces = lacking / across[0] if across[0, 0] > 0.0 else -lacking
+    else:
+        sizes = np.sqrt(np.maximum(across.diagonal(), 1e-300))
+        values, vectors = np.linalg.eigh(across / sizes / sizes[:, None])
+        if not values[0] > _INDEPENDENT:
+            return None
+        forces = (vectors @ ((vectors.T @ (lacking / sizes)) / values)) / sizes
+    if forces.min() < 0.0:
+        return None
+    solution, multipliers[chosen] = solution + gives.dot(forces), forces
+    broken = gradients.dot(solution) - bounds < -_BROKEN * np.sqrt(np.einsum("ij,ij->i", gradients, gradients))
+    broken[chosen] = False
+    return None if broken.any() else (solution, multipliers)
 
 
 def _by_rows(

@@ -47,11 +47,8 @@ class Touch(NamedTuple):
     """What their derivative has beside that of dead forces, by the joints; see `Gaps.curvature`."""
     surroundings: Surroundings
     """The robot among the obstacles."""
-
-    @property
-    def penetration(self) -> float:
-        """Depth of the deepest penetration, zero without one [m]."""
-        return max(0.0, -float(self.gaps.values.min(initial=0.0)))
+    penetration: float
+    """Depth of the deepest penetration, zero without one [m]."""
 
     @property
     def pushes(self) -> FloatArray:
@@ -118,7 +115,8 @@ class NearSurfaces:
         gaps = self._surroundings.at(q, near * self._reach)
         on_motors, on_springs = point.columns(gaps.jacobian)
         each = forces.at(gaps)
-        return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._surroundings)
+        deepest = max(0.0, -float(gaps.values.min())) if len(gaps.values) else 0.0
+        return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._surroundings, deepest)
 
 
 def joined(applied: JointLoad, contact: JointLoad) -> JointLoad:
