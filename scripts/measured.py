@@ -1,8 +1,8 @@
 """Compare models of the package with measurements that others have published.
 
 Each comparison has its measurements, with source and licence, in docs/examples or in the package, predicts them with the
-robots of the package, and tells the errors: an inflated link, tubes of kites, a long boom, a fly rod, strips of laminate. The
-tendon-driven arm has scripts of its own, measured_arm.py and measured_arm_fit.py.
+robots of the package, and tells the errors: an inflated link, tubes of kites, a long boom, a fly rod, strips of laminate, a
+silicone arm under pressure. The tendon-driven arm has scripts of its own, measured_arm.py and measured_arm_fit.py.
 
 Prints Markdown tables; under a minute for all.
 """
@@ -26,6 +26,7 @@ from studies.measured.fly_rod import FLY_ROD
 from studies.measured.inflated_link import INFLATED_LINK
 from studies.measured.kite_tubes import KITE_TUBES
 from studies.measured.recorded_arm import arm_rows, read_record
+from studies.measured.soft_arm import SOFT_ARM
 from studies.shared.checkout import CHECKOUT
 from studies.shared.folders import free_folder
 from studies.shared.markdown import marked
@@ -38,6 +39,7 @@ COMPARISONS: dict[str, Comparison] = {
     "boom": BOOM,
     "fly_rod": FLY_ROD,
     "composite_strip": COMPOSITE_STRIP,
+    "soft_arm": SOFT_ARM,
 }
 """By name, in the order of the page."""
 BEGIN, END = "<!-- measured_overview:begin -->", "<!-- measured_overview:end -->"

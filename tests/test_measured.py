@@ -11,11 +11,11 @@ import pytest
 from scipy.integrate import solve_ivp
 from scipy.optimize import brentq, root
 
-from studies.measured import boom, composite_strip, fly_rod, inflated_link, kite_tubes
+from studies.measured import boom, composite_strip, fly_rod, inflated_link, kite_tubes, soft_arm
 from tests.conftest import CHECKOUT
 from tests.support.scripts import load_script, run_script
 
-NAMES = ("inflated_link", "kite_tubes", "boom", "fly_rod", "composite_strip")
+NAMES = ("inflated_link", "kite_tubes", "boom", "fly_rod", "composite_strip", "soft_arm")
 
 
 def recorded(name: str) -> Any:
@@ -187,6 +187,59 @@ def test_a_strip_of_laminate_is_a_rod_of_three_stiffnesses() -> None:
     loads, printed = np.array([[31.53, 68.97, 126.12, 233.48, 318.15, 400.83], [21.23, 45.49, 81.54, 142.51, 180.21, 211.82]])
     down = 1e3 * composite_strip.displacements(composite_strip.LAMINATES[1], 0.0, 1e-3 * loads)[:, 2]
     assert down == pytest.approx(printed, abs=2.0)  # read from a plot, whose curve is not smooth to 2 mm
+
+
+# --- The silicone arm
+
+
+def test_the_section_of_the_silicone_arm_is_what_it_says() -> None:
+    """Areas, centroid and second moment by sums over a grid of 0.05 mm: a triangle with half discs, hollow but for 2 mm."""
+    radius, cell = 0.014, 5e-5
+    x, y = np.meshgrid(*[np.arange(-0.03, 0.03, cell) + cell / 2.0] * 2)
+    solid, first = np.zeros_like(x, dtype=bool), None
+    height = radius / math.sqrt(3.0)
+    inside = np.ones_like(solid)
+    for turn in (0.0, 2.0 * math.pi / 3.0, 4.0 * math.pi / 3.0):
+        out, along = math.cos(turn) * x + math.sin(turn) * y - height, -math.sin(turn) * x + math.cos(turn) * y
+        chamber = (np.hypot(out, along) < radius - 0.002) & (out > 0.002)  # the source takes the floor for a rectangle
+        solid |= (np.hypot(out, along) < radius) & (out > 0.0) & ~chamber
+        first = chamber if first is None else first
+        inside &= out <= 0.0
+    solid |= inside
+    found = soft_arm.section(radius)
+    assert found.chamber == pytest.approx(float(first.sum()) * cell**2, rel=0.01)
+    assert found.distance == pytest.approx(float(x[first].mean()), rel=0.01)
+    assert found.silicone == pytest.approx(float(solid.sum()) * cell**2, rel=0.01)
+    assert found.second_moment == pytest.approx(float((x[solid] ** 2).sum()) * cell**2, rel=0.01)
+
+
+def test_the_silicone_arm_is_a_tapered_elastica_of_pressure_and_weight() -> None:
+    """theta' = (p A d - M) / EI with M of the weight beyond, to 2 % by four pieces a segment; and the recorded errors."""
+    record = recorded("soft_arm")
+    times, pressures, measured = soft_arm.measurements()
+    assert [times.tolist(), measured.tolist()] == [record["times_s"], record["measured"]]
+    assert record["bends_rad"] == pytest.approx(np.sqrt(np.mean((np.array(record["found"]) - measured)[:, :2] ** 2, axis=0)))
+    push, count = 8e4, 500
+    step, moment, stiffness, weight = [], [], [], []
+    for (mass, end), wide, narrow in zip(soft_arm.MASSES, (0.035, 0.028), (0.028, 0.0198), strict=True):
+        sections = [soft_arm.section((wide + (narrow - wide) * (k + 0.5) / count) / 2.0) for k in range(count)]
+        whole = sum(one.silicone for one in sections)
+        step += [0.125 / count] * count + [0.02]
+        moment += [push * one.chamber * one.distance for one in sections] + [0.0]
+        stiffness += [4.0 * 85e3 * one.second_moment for one in sections] + [1e3]
+        weight += [9.81 * mass * one.silicone / whole for one in sections] + [9.81 * end]
+    steps, angle = np.array(step), np.zeros(len(step))
+    for _ in range(300):
+        aside = np.cumsum(np.sin(angle) * steps) - np.sin(angle) * steps / 2.0
+        hung = np.cumsum((np.array(weight) * aside)[::-1])[::-1] - aside * np.cumsum(weight[::-1])[::-1]
+        turned = np.cumsum((np.array(moment) - hung) / stiffness * steps)
+        angle, change = 0.7 * angle + 0.3 * turned, np.abs(turned - angle).max()
+        if change < 1e-9:
+            break
+    upper, lower, *tip = soft_arm.poses(np.array([[push, 0.0, 0.0, push, 0.0, 0.0]]))[0]
+    assert [upper, lower] == pytest.approx([angle[count - 1], angle[-2] - angle[count]], rel=0.02)
+    assert tip == pytest.approx([float(np.sin(angle) @ steps), 0.0, float(np.cos(angle) @ steps)], abs=2e-3)
+    assert record["found"][0] == pytest.approx(soft_arm.poses(pressures[:1])[0].tolist(), rel=1e-6)
 
 
 # --- The script
