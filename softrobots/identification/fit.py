@@ -29,6 +29,9 @@ _NEAR = 0.01  # change of the parameters, relative, up to which those derivative
 _SAME = 1e-8  # share of the cost that a further step may gain at the end: 0.005 standard errors with 1000 rows
 _SAME_RUBBING = 1e-5  # the same of a robot with dry friction: where rows begin to slip, the cost has kinks
 _ROUNDING = 1e-22  # share of the first cost that is rounding
+_WITHOUT_NOISE = 1e-12  # share of the first cost below which the rows have no noise: then all digits are looked for
+_PATIENCE = 30  # steps of a search before full steps are tried
+_LEAPS = 6  # full steps in a row
 
 
 def rho(loss: str, z: FloatArray) -> FloatArray:
@@ -105,21 +108,49 @@ class Fit:
         with np.errstate(divide="ignore"):
             bounds = [self._coordinates(np.maximum(ends, np.where(self._logarithmic, 0.0, -np.inf)))
                       for ends in (limits.lower, limits.upper)]  # fmt: skip
-        for _ in range(_ROUNDS if most else 0):
-            left, self._middle = max(1, most - len(self.course)), x
+        rounds, spent = 0, 0
+        while rounds < _ROUNDS and spent < most:
+            left, self._middle = min(most - spent, _PATIENCE), x
             found = least_squares(
                 self._rows, x, self._jacobian, bounds, x_scale="jac", loss=self._loss, ftol=self._same, xtol=1e-9,
                 gtol=1e-12, max_nfev=left,
             )  # fmt: skip
-            x, self.message = found.x, "converged" if found.status > 0 else f"not converged in {most} steps"
+            x, spent, rounds = found.x, spent + found.nfev, rounds + (found.status > 0)
             if self._exact_at is not x:
                 self._refresh(x)
+            lowest = self._is_lowest(x)
+            if not lowest or self._cost(x) <= _WITHOUT_NOISE * self.course[0][0]:
+                x = self._leap(x, *bounds)
+                lowest = self._is_lowest(x)
+            self.message = "converged" if found.status > 0 or lowest else f"not converged in {most} steps"
             held = self._null(x)
-            lowest = len(held) == len(self._held) and self._is_lowest(x)
-            if found.status == 0 or lowest or (not len(self._weak) and len(self._run_off(x))):
+            if (lowest and len(held) == len(self._held)) or (not len(self._weak) and len(self._run_off(x))):
                 break
             self._held = held
         return x
+
+    def _leap(self, x: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
+        """Take full steps of Gauss and Newton, the first of which may lose; return the best coordinates, shape (P,).
+
+        In a narrow valley that bends, a full step leaves it and the next one finds it again farther on, where steps of which
+        each gains are short. Without noise they also find all digits that rounding leaves.
+        """
+        best, costs = x, [self._cost(x)]
+        while len(costs) <= _LEAPS and (len(costs) < 3 or costs[-1] < costs[-2]):
+            rows, slopes = self._rows(x), self._all_slopes(x)
+            size = np.sqrt(self._loss(rows**2)[1])
+            norms = np.linalg.norm(slopes, axis=0)
+            norms[norms == 0.0] = 1.0
+            step = np.linalg.lstsq(slopes * size[:, None] / norms, rows * size, rcond=None)[0] / norms
+            x = np.clip(x - step, lower, upper)
+            if not np.isfinite(self._rows(x)).all():
+                break
+            self._refresh(x)
+            costs.append(self._cost(x))
+            best = x if costs[-1] < min(costs[:-1]) else best
+        if best is not x:
+            self._refresh(best)
+        return best
 
     def at_end(self) -> tuple[Prediction, FloatArray, FloatArray]:
         """Return the prediction at the end, the residuals of what counts, (rows,), and their Jacobian, (rows, P)."""
