@@ -14,6 +14,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
+from tests.support.hostile_data import results
 
 Tool = Callable[[str], ModuleType]
 
@@ -29,6 +30,11 @@ def motion() -> sr.Motion:
 
 def batch() -> Any:
     return sr.compile(paper_arm(), backend="python").equilibria([(0.3, 0.6, -0.8), (0.1, np.nan, 0.2)], [(0, 0, -5), (1, 2, 3)])
+
+
+def motions() -> Any:
+    compiled = sr.compile(paper_arm(), backend="python")
+    return compiled.simulations(0.01, [(0.3, 0.6, -0.8), (0.1, 0.2, 0.3)], time_step=0.005, output_step=0.005)
 
 
 def measured(labels: Any = ("a", "b", "c")) -> sr.Measurements:
@@ -48,6 +54,14 @@ def measured(labels: Any = ("a", "b", "c")) -> sr.Measurements:
 RESULTS: dict[str, Callable[[], Any]] = {
     "motion": motion,
     "modes": lambda: sr.vibration_modes(paper_arm(), sr.solve_equilibrium(paper_arm(), (0.3, 0.6, -0.8))),
+    "equilibrium": lambda: sr.solve_equilibrium(paper_arm(), (0.3, 0.6, -0.8), (0, 10, -15)),
+    "solution": lambda: sr.solve_ik(paper_arm(), (0.9, 0.2, 0.3), (0, 0, -5)),
+    "estimate": lambda: sr.estimate_load(paper_arm(), (0.3, 0.6, -0.8), (1.0, -2.0, 3.0)),
+    "displacement": lambda: results()["imposed_displacement"],
+    "branches": lambda: results()["branches"],
+    "branch": lambda: results()["branches"][0],
+    "map": lambda: results()["workspace_map"],
+    "motions": motions,
     "workspace": lambda: sr.sample_workspace(paper_arm(), 5),
     "measurements": measured,
     "batch": batch,
@@ -79,6 +93,39 @@ def test_columns_have_the_numbers_of_the_result_and_their_units(tool: Tool) -> N
     assert frame["status"].tolist() == many.status.tolist()
     np.testing.assert_array_equal(frame[[f"spring {number} [rad or m]" for number in range(1, 5)]], many.q_springs)
     np.testing.assert_array_equal(frame["residual [N m]"], many.residual)
+    moved = motions()
+    frame = sr.to_dataframe(moved)
+    assert len(frame) == len(moved.status) * len(moved.time)
+    last = frame[frame["case"] == 1].iloc[-1]
+    assert last["time [s]"] == moved.time[-1]
+    assert last[[f"tip {axis} [m]" for axis in "xyz"]].tolist() == moved.tip_position[1, -1].tolist()
+    assert last["spring velocity 2 [rad/s or m/s]"] == moved.velocities[1, -1, 1]
+
+
+def test_a_solve_is_one_row_and_what_has_several_has_one_each(tool: Tool) -> None:
+    tool("pandas")
+    held = RESULTS["equilibrium"]()
+    (row,) = sr.to_dataframe(held).to_dict("records")
+    assert [row[f"{name} [rad]"] for name in held.model.actuator_names] == held.q_motors.tolist()
+    assert [row[f"{name} load [N m]"] for name in held.model.actuator_names] == held.motor_torques.tolist()
+    assert (row["tip z [m]"], row["stable"]) == (held.tip_position[2], 1)
+    (row,) = sr.to_dataframe(RESULTS["solution"]()).to_dict("records")
+    assert (row["target x [m]"], row["target y [m]"], row["target z [m]"]) == (0.9, 0.2, 0.3)
+    (row,), found = sr.to_dataframe(RESULTS["estimate"]()).to_dict("records"), RESULTS["estimate"]()
+    assert [row[f"force {axis} [N]"] for axis in "xyz"] == found.force.tolist()
+    branches = RESULTS["branches"]()
+    frame = sr.to_dataframe(branches)
+    for branch in branches:
+        rows = frame[frame["branch"] == branch.label]
+        assert rows["force [N]"].tolist() == branch.forces.tolist()
+        assert rows["tip x [m]"].tolist() == [one.tip_position[0] for one in branch.equilibria]
+    space = RESULTS["map"]()
+    frame = sr.to_dataframe(space)
+    for number, place in enumerate(np.ndindex(*space.reached.shape)):
+        target, row = (space.grid.x[place[0]], space.grid.y[place[1]], space.grid.z[place[2]]), frame.iloc[number]
+        assert tuple(row[[f"target {axis} [m]" for axis in "xyz"]]) == target
+        assert (row["load [N]"], row["reached"]) == (space.loads[place[3]], space.reached[place])
+        assert row["required pressure [Pa]"] == space.required_pressure[place]
 
 
 @pytest.mark.parametrize("labels", [("a", "b", "c"), None])
@@ -102,7 +149,7 @@ def test_measurements_come_back_from_their_table(tool: Tool, labels: Any) -> Non
 def test_what_is_no_table_and_a_missing_package_are_told(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     pandas = tool("pandas")
     with pytest.raises(sr.ParameterError, match=r"Trajectory.*Workspace.*Measurements"):
-        sr.to_dataframe(sr.solve_equilibrium(paper_arm(), (0.3, 0.6, -0.8)))
+        sr.to_dataframe(paper_arm())
     with pytest.raises(sr.ParameterError, match="a mapping, because the table is not one that to_dataframe made"):
         sr.Measurements.from_dataframe(pandas.DataFrame({"a": [1.0]}))
     monkeypatch.setitem(sys.modules, "pandas", None)

@@ -294,6 +294,6 @@ def test_other_objects_are_refused(arm: sr.SoftModel, results: dict, tmp_path: P
         match="ImposedDisplacement, LoadEstimate, Trajectory, Workspace, WorkspaceMap, tuple of EquilibriumBranch",
     ):
         sr.save_result(arm, tmp_path / "a.npz")
-    with pytest.raises(sr.ParameterError, match="one of Trajectory, Workspace, Motion, VibrationModes"):
-        sr.save_csv(results["equilibrium"], tmp_path / "a.csv")
+    with pytest.raises(sr.ParameterError, match="Trajectory, Workspace, WorkspaceMap, tuple of EquilibriumBranch"):
+        sr.save_csv(arm, tmp_path / "a.csv")
     assert list(tmp_path.iterdir()) == []

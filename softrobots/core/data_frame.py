@@ -9,17 +9,15 @@ from softrobots.core.result_file import table_of
 
 
 def to_dataframe(result: Any) -> Any:
-    """Return a result that has rows as a `pandas.DataFrame`, with the columns that `save_csv` writes.
+    """Return a result as a `pandas.DataFrame`, with the rows and columns that `save_csv` writes.
 
-    That is a trajectory, contact path, motion, vibration modes, workspace, measurements, or a batch of a compiled model. Units
-    are in the names of the columns or, of a trajectory, those of `save_csv`. How `Measurements.from_dataframe` reads a table of
-    measurements again stands in its `attrs["columns"]`.
+    How `Measurements.from_dataframe` reads a table of measurements again stands in its `attrs["columns"]`.
 
     Args:
         result: The result.
 
     Raises:
-        ParameterError: If it has no rows.
+        ParameterError: If it is no table.
         MissingDependency: If pandas is not installed (extra `pandas`).
     """
     columns, reading = table_of(result)

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -72,6 +72,16 @@ OWN_COLUMNS = "# columns: "
 """Beginning of the first line of a CSV file that says how its columns are read, as JSON."""
 
 
+def named_columns(names: Sequence[str], units: Sequence[str], values: Any, words: str = "") -> dict[str, Any]:
+    """Return the columns of an array, shape (n, m), by m names and units, e.g. "motor_1 load [N m]"."""
+    return {f"{name}{words} [{unit}]": column for name, unit, column in zip(names, units, values.T, strict=True)}
+
+
+def vector_columns(what: str, unit: str, values: Any) -> dict[str, Any]:
+    """Return the columns of vectors, shape (n, 3), e.g. "tip x [m]"."""
+    return named_columns([f"{what} {axis}" for axis in "xyz"], [unit] * 3, values)
+
+
 class Table(NamedTuple):
     """A result as a table."""
 
@@ -134,16 +144,14 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
 
 
 def save_csv(result: Any, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-    """Save a result that has rows as a CSV table in full precision.
+    """Save a result as a CSV table in full precision.
 
-    That is a trajectory, contact path, motion, vibration modes, workspace, measurements, or a batch of a compiled model.
-    Columns of a trajectory: `t` [s], `x, y, z` (target, so that the file can be read as waypoints) [m], `tip_x, tip_y, tip_z`
-    [m], `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for each motor and spring
-    [rad] (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link, and the normal force on each
-    obstacle that is touched. Those of a motion have their unit in their name: time, motors, springs, their velocities, motor
-    torques, tip, force on the tip and energies. So have those of a contact path: parameter, work of friction, tip, sum of the
-    contact forces, joints; and those of modes: frequency, damping ratio, effective masses, motion of the tip and of each
-    coordinate. `to_dataframe` gives the same columns.
+    An equilibrium, IK solution, load estimate or imposed displacement is one row; a trajectory, contact path, motion, branches,
+    vibration modes, workspace, workspace map, measurements and the batches of a compiled model have many. Columns have their
+    unit in their name, but for those of a trajectory: `t` [s], `x, y, z` (target, so that the file can be read as waypoints)
+    [m], `tip_x, tip_y, tip_z` [m], `tip_error` [m], of poses `roll, pitch, yaw` (target) and `orientation_error` [rad], one for
+    each motor and spring [rad] (`joint_x` where a joint is called `x`), `moment_<i>` [N m] for each inflated link, and the
+    normal force on each obstacle that is touched. `to_dataframe` gives the same columns.
 
     Args:
         result: The result.

@@ -14,7 +14,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, finite_number, increasing, read_only
 from softrobots.core.errors import FileFormatError
-from softrobots.core.result_file import KINDS, Kind
+from softrobots.core.result_file import KINDS, Kind, named_columns, vector_columns
 from softrobots.dynamics.motion import Motion, MotionEnergy
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.model.actuators import load_units
@@ -71,22 +71,13 @@ def _unpack(fields: Mapping[str, Any]) -> Motion:
 def _table(motion: Motion) -> dict[str, FloatArray]:
     """Columns of a CSV file of a motion, each name with its unit."""
     model = motion.model
-    units, loads = model.actuators.units, load_units(model.actuators.units)
-    motors = list(zip(model.motor_joints, units, strict=True))
-    springs = list(zip(model.spring_joints, model.springs.units, strict=True))
-    blocks: list[tuple[list[str], Any]] = [
-        ([f"{name} [{unit}]" for name, unit in motors], motion.q_motors),
-        ([f"{name} [{unit}]" for name, unit in springs], motion.q_springs),
-        ([f"{name} velocity [{unit}/s]" for name, unit in motors], motion.motor_velocities),
-        ([f"{name} velocity [{unit}/s]" for name, unit in springs], motion.velocities),
-        ([f"{name} load [{unit}]" for name, unit in zip(model.motor_joints, loads, strict=True)], motion.motor_torques),
-        ([f"tip {axis} [m]" for axis in "xyz"], motion.tip_position),
-        ([f"force {axis} [N]" for axis in "xyz"], motion.forces),
-    ]
+    motors, springs = (model.actuator_names, model.actuator_units), (model.spring_joints, model.springs.units)
+    table = {"time [s]": motion.time} | named_columns(*motors, motion.q_motors) | named_columns(*springs, motion.q_springs)
+    for (names, units), rates in ((motors, motion.motor_velocities), (springs, motion.velocities)):
+        table |= named_columns(names, [f"{unit}/s" for unit in units], rates, " velocity")
+    table |= named_columns(model.actuator_names, load_units(model.actuator_units), motion.motor_torques, " load")
+    table |= vector_columns("tip", "m", motion.tip_position) | vector_columns("force", "N", motion.forces)
     energies = {one.name: getattr(motion.energy, one.name) for one in fields_of(MotionEnergy)}
-    table = {"time [s]": motion.time}
-    for names, values in blocks:
-        table |= dict(zip(names, values.T, strict=True))
     return table | {f"{name.replace('_', ' ')} [J]": values for name, values in energies.items()}
 
 

@@ -1,4 +1,4 @@
-"""Serialisation of the results of statics: named arrays for result files, and columns of CSV tables.
+"""Serialisation of the results of statics: named arrays for result files.
 
 A file holds the robot (URDF and springs), the load and the coordinates. Everything else is computed again on loading, and a
 file whose residual is larger than it claims is refused.
@@ -12,12 +12,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, increasing, read_only
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
-from softrobots.core.result_file import KINDS, Kind, counts, label, text
+from softrobots.core.result_file import KINDS, TABLES, Kind, counts, label, text
 from softrobots.model.dry_friction import FrictionMemory
 from softrobots.model.friction_coordinates import memory_of, remembering
 from softrobots.model.loader import load_again, load_arguments
@@ -34,9 +33,19 @@ from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.statics.load_estimation import METHODS as ESTIMATIONS
 from softrobots.statics.load_estimation import LoadEstimate, estimate_at, packed_estimate
 from softrobots.statics.loads import Load, load_of_data
+from softrobots.statics.tables.columns import (
+    branch_table,
+    equilibrium_table,
+    estimate_table,
+    ik_table,
+    imposed_table,
+    map_table,
+    trajectory_table,
+    workspace_table,
+)
 from softrobots.statics.tip_goal import Goal, checked_orientation
 from softrobots.statics.trajectory import Trajectory
-from softrobots.statics.workspace import FIELDS, Workspace, workspace_at, workspace_table
+from softrobots.statics.workspace import FIELDS, Workspace, workspace_at
 from softrobots.statics.workspace_map import WorkspaceMap, packed, unpacked
 
 _COLUMNS = ("q_motors", "q_springs", "residual", "tolerance", "iterations")
@@ -256,37 +265,31 @@ def _unpack_branches(fields: Mapping[str, Any]) -> tuple[EquilibriumBranch, ...]
     )
 
 
-def _trajectory_table(trajectory: Trajectory) -> dict[str, FloatArray]:
-    """Columns of a CSV file of a trajectory; see `save_csv`."""
-    model, angles = trajectory.model, trajectory.orientation_error
-    moments = np.zeros((len(trajectory.times), 0)) if trajectory.link_moments is None else trajectory.link_moments
-    last = {f"moment_{link}": column for link, column in enumerate(moments.T, start=1)}
-    columns = {"t": trajectory.times} | dict(zip("xyz", trajectory.targets.T, strict=True))
-    columns |= dict(zip(("tip_x", "tip_y", "tip_z"), trajectory.tip_positions.T, strict=True))
-    columns["tip_error"] = trajectory.tip_error
-    if trajectory.orientations is not None and angles is not None:
-        turned = np.array([pin.rpy.matrixToRpy(one) for one in trajectory.orientations])
-        columns |= dict(zip(("roll", "pitch", "yaw"), turned.T, strict=True)) | {"orientation_error": angles}
-    joints = np.hstack([trajectory.q_motors, trajectory.q_springs])
-    for name, column in zip((*model.motor_joints, *model.spring_joints), joints.T, strict=True):
-        while name in columns or name in last:
-            name = f"joint_{name}"
-        columns[name] = column
-    forces = {f"force on {name} [N]": force for name, force in trajectory.contact_forces.items()}
-    return columns | last | forces
-
-
 KINDS.update(
-    equilibrium=Kind(Equilibrium, lambda result: _pack_rows((result,)), lambda fields: _unpack_rows(fields)[0]),
-    ik_solution=Kind(IkSolution, _pack_solution, _unpack_solution),
-    imposed_displacement=Kind(ImposedDisplacement, _pack_imposed, _unpack_imposed),
+    equilibrium=Kind(
+        Equilibrium,
+        lambda result: _pack_rows((result,)),
+        lambda fields: _unpack_rows(fields)[0],
+        to_table=equilibrium_table,
+    ),
+    ik_solution=Kind(IkSolution, _pack_solution, _unpack_solution, to_table=ik_table),
+    imposed_displacement=Kind(ImposedDisplacement, _pack_imposed, _unpack_imposed, to_table=imposed_table),
     load_estimate=Kind(
         LoadEstimate,
         lambda result: _pack_rows((result.equilibrium,)) | packed_estimate(result),
         lambda fields: estimate_at(_unpack_rows(fields)[0], fields),
+        to_table=estimate_table,
     ),
-    trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True, to_table=_trajectory_table),
+    trajectory=Kind(Trajectory, _pack_trajectory, _unpack_trajectory, many=True, to_table=trajectory_table),
     workspace=Kind(Workspace, _pack_workspace, _unpack_workspace, many=True, to_table=workspace_table),
-    workspace_map=Kind(WorkspaceMap, _pack_map, _unpack_map, many=True),
-    branches=Kind(tuple, _pack_branches, _unpack_branches, many=True, items=EquilibriumBranch),
+    workspace_map=Kind(WorkspaceMap, _pack_map, _unpack_map, many=True, to_table=map_table),
+    branches=Kind(
+        tuple,
+        _pack_branches,
+        _unpack_branches,
+        many=True,
+        items=EquilibriumBranch,
+        to_table=lambda branches: branch_table(*branches),
+    ),
 )
+TABLES[EquilibriumBranch] = branch_table

@@ -229,14 +229,3 @@ def workspace_at(
         if np.abs(tip - tips[row]).max() > 1e-9 * max(model.reach, 1.0):
             raise ParameterError("tip_positions", tips[row], f"the tip of its row {row}, {tip.tolist()}")
     return Workspace(model, load, read_only(motors), read_only(springs), read_only(tips), read_only(measures), int(refused))
-
-
-def workspace_table(workspace: Workspace) -> dict[str, FloatArray]:
-    """Columns of a CSV file of a workspace, each name with its unit; see `save_csv`."""
-    model = workspace.model
-    units = (*model.actuator_units, *model.springs.units)
-    joints = np.hstack([workspace.q_motors, workspace.q_springs]).T
-    names = zip((*model.actuator_names, *model.spring_joints), units, joints, strict=True)
-    table = {f"{name} [{unit}]": column for name, unit, column in names}
-    table |= {f"tip {axis} [m]": column for axis, column in zip("xyz", workspace.tip_positions.T, strict=True)}
-    return table | {"manipulability [m^3/rad^3]": workspace.manipulability}

@@ -14,7 +14,7 @@ from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, read_only
-from softrobots.core.result_file import TABLES
+from softrobots.core.result_file import TABLES, vector_columns
 from softrobots.core.summary import Part, Summarised, Table, facts, field_facts
 from softrobots.dynamics.motion import Motion, MotionEnergy
 
@@ -197,28 +197,6 @@ class MotorBatch(Batch):
     """Angle between the loaded tip and its target orientation, shape (n,) [rad]; None for positions."""
 
 
-_AXES = {"tip_positions": ("tip", "m"), "forces": ("force", "N")}
-_SINGLE = {"residual": "N m", "unexplained": "N m", "observability": "m", "tip_error": "m", "orientation_error": "rad"}
-
-
-def _table(batch: Batch) -> dict[str, FloatArray]:
-    """Columns of a CSV file of a batch, a line a case; actuators and springs by their number, in the order of the model."""
-    table: dict[str, FloatArray] = {"status": batch.status}
-    for name, values in vars(batch).items():
-        if name in _SINGLE and values is not None:
-            table[f"{name.replace('_', ' ')} [{_SINGLE[name]}]"] = values
-        elif name in _AXES:
-            what, unit = _AXES[name]
-            table |= {f"{what} {axis} [{unit}]": column for axis, column in zip("xyz", values.T, strict=True)}
-        elif name in ("q_motors", "q_springs"):
-            kind = "motor" if name == "q_motors" else "spring"
-            table |= {f"{kind} {number} [rad or m]": column for number, column in enumerate(values.T, 1)}
-    return table
-
-
-TABLES[Batch] = _table
-
-
 @dataclass(frozen=True, eq=False, init=False, repr=False)
 class CompiledMotion(Motion):
     """A `Motion` whose torques and energies are computed when they are asked for, from all steps of the same motion again."""
@@ -282,3 +260,34 @@ class MotionBatch(CaseResults):
     where it is not measured."""
     tolerance: float | None = None
     """Largest `tip_error` that was asked for [m]; None for fixed steps."""
+
+
+_AXES = {"tip_positions": ("tip", "m"), "tip_position": ("tip", "m"), "forces": ("force", "N")}
+_SINGLE = {"residual": "N m", "unexplained": "N m", "observability": "m", "tip_error": "m", "orientation_error": "rad"}
+_NUMBERED = {
+    "q_motors": ("motor", "rad or m"),
+    "q_springs": ("spring", "rad or m"),
+    "velocities": ("spring velocity", "rad/s or m/s"),
+}
+
+
+def _table(batch: Batch | MotionBatch) -> dict[str, Any]:
+    """Columns of a batch, a line a case, or an instant of a case; actuators and springs by number, in the model's order."""
+    table, each, n = dict[str, Any](), 1, len(batch.status)
+    if isinstance(batch, MotionBatch):
+        each = len(batch.time)
+        table = {"case": np.repeat(np.arange(n), each), "time [s]": np.tile(batch.time, n)}
+    table["status"] = np.repeat(batch.status, each)
+    for name, values in vars(batch).items():
+        if name in _SINGLE and values is not None:
+            table[f"{name.replace('_', ' ')} [{_SINGLE[name]}]"] = np.repeat(values, each)
+        elif name in _AXES:
+            table |= vector_columns(*_AXES[name], values.reshape(-1, 3))
+        elif name in _NUMBERED:
+            what, unit = _NUMBERED[name]
+            rows = values.reshape(-1, values.shape[-1])
+            table |= {f"{what} {number} [{unit}]": column for number, column in enumerate(rows.T, 1)}
+    return table
+
+
+TABLES.update({Batch: _table, MotionBatch: _table})
