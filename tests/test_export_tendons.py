@@ -63,6 +63,7 @@ CASES = {
     "loaded": Case(
         sr.PccArm, {"segment_lengths": (0.5, 0.4), "kind": "tension"}, (40.0, 40.0, 40.0, 40.0, 40.0, 40.0), (8.0, 0.0, -3.0)
     ),
+    "length": Case(sr.PccArm, {"segment_lengths": (0.5, 0.4)}, (0.47, 0.51, 0.5, 0.4, 0.42, 0.38), (5.0, -3.0, 2.0)),
     "mckibben": Case(
         sr.PccArm, {"segment_lengths": (0.5, 0.4), "kind": "mckibben"}, (9e4, 5e4, 7e4, 4e4, 6e4, 5e4), (1.0, -1.0, 0.5)
     ),
@@ -79,7 +80,9 @@ def written(case: Case, hinges: int, **options: Any) -> str:
 def stand(mujoco: ModuleType, case: Case, hinges: int) -> Any:
     """Where MuJoCo says that the arm stands; its search begins where we say so, which saves time."""
     text, model = written(case, hinges), case.load(chain="lumped", hinges=hinges)
-    start = sr.solve_equilibrium(model, case.inputs, case.force, gravity=sr.EARTH_GRAVITY).q_springs
+    start = sr.solve_equilibrium(model, case.inputs, case.force, gravity=sr.EARTH_GRAVITY).q
+    if model.muscles[0].kind == "length":
+        start = np.append(start, case.inputs)  # the winches
     return mujoco_equilibrium(mujoco, text, case.inputs if "<actuator>" in text else (), case.force, start)
 
 
@@ -112,7 +115,7 @@ def test_the_arm_stands_in_mujoco_where_it_stands_here(tool: Tool, name: str) ->
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("name", ["helical", "elastic", "loaded", "mckibben"])
+@pytest.mark.parametrize("name", ["helical", "elastic", "length", "loaded", "mckibben"])
 def test_thirty_hinges_a_segment_are_within_a_ten_thousandth_of_the_length(tool: Tool, name: str) -> None:
     """From 8 to 30 hinges an error of second order becomes 14 times smaller."""
     coarse, fine = misses(tool("mujoco"), name, (8, 30))
@@ -131,7 +134,8 @@ def mujoco_data(mujoco: ModuleType, text: str) -> Any:
 
 def lengths(data: Any, arm: sr.SoftModel) -> np.ndarray:
     """Lengths of the actuators, those at rest and what MuJoCo's tendons have gained."""
-    return np.asarray([tag.rest_length for tag in arm.muscles] + data.ten_length - data.model.tendon_length0)
+    gained = (data.ten_length - data.model.tendon_length0)[: len(arm.muscles)]
+    return np.asarray([tag.rest_length for tag in arm.muscles] + gained)
 
 
 def test_tendons_change_their_lengths_as_straight_actuators_do(tool: Tool) -> None:
@@ -259,33 +263,70 @@ def test_a_simulation_with_a_slack_tendon_comes_to_rest(tool: Tool) -> None:
     assert lengths(data, arm)[4] < case.inputs[4] - 2.0 / 8e3
 
 
-def test_servos_of_given_lengths_settle_where_our_statics_says(tool: Tool) -> None:
-    """At the lengths that they reach, tips and tensions are ours, with an error of second order."""
-    mujoco, wanted, errors = tool("mujoco"), (0.47, 0.51, 0.5, 0.4, 0.42, 0.38), []
-    ours = sr.load_model(sr.PccArm(segment_lengths=(0.5, 0.4), elastic_sections=6))
+def winches(data: Any) -> np.ndarray:
+    """Positions of the slide joints, which MuJoCo has last."""
+    return np.asarray(data.qpos[-data.model.nu :])
+
+
+def test_winches_hold_given_lengths_where_our_statics_says(tool: Tool) -> None:
+    """Lengths are met to 1e-4 of some 5 cm, tip and tensions are ours, with an error of second order."""
+    mujoco, case = tool("mujoco"), CASES["length"]
+    ours, errors = sr.solve_equilibrium(case.load(elastic_sections=10), case.inputs, gravity=sr.EARTH_GRAVITY), []
     for hinges in (3, 6):
-        arm = sr.load_model(sr.PccArm(segment_lengths=(0.5, 0.4), chain="lumped", hinges=hinges))
-        data = mujoco_data(mujoco, to_mjcf(arm, wanted, gravity=sr.EARTH_GRAVITY))
-        mujoco.mj_step(data.model, data, 1000)
+        arm = case.load(chain="lumped", hinges=hinges)
+        model = mujoco.MjModel.from_xml_string(to_mjcf(arm, gravity=sr.EARTH_GRAVITY))
+        data = mujoco.MjData(model)
+        assert np.array_equal(winches(data), arm.relaxed_motors)
+        data.ctrl[:] = case.inputs  # at once
+        mujoco.mj_step(model, data, 1500)
         assert np.abs(data.qvel).max() < 1e-6
-        reached = lengths(data, arm)
-        assert 1e-5 < np.abs(reached - wanted).max() < 1e-4  # of 0.5 mm, at a tenth of the largest tension
-        found = sr.solve_equilibrium(ours, reached, gravity=sr.EARTH_GRAVITY)
-        errors.append(float(np.linalg.norm(data.body("tip").xpos - found.tip_position)))
-        assert np.abs(data.actuator_force - found.motor_torques).max() < 0.1 * np.abs(found.motor_torques).max()
+        assert np.abs(winches(data) - case.inputs).max() < 5e-7
+        assert np.abs(lengths(data, arm) + winches(data) - arm.relaxed_motors - case.inputs).max() < 5e-6
+        errors.append(float(np.linalg.norm(data.body("tip").xpos - ours.tip_position)))
     assert errors[1] < 0.5 * errors[0] < 2e-3
+    assert ours.muscle_forces.min() < -10.0
+    assert np.abs(data.actuator_force - ours.muscle_forces).max() < 0.02 * np.abs(ours.muscle_forces).max()
 
 
-def test_servos_of_given_lengths_push_where_statics_does(tool: Tool) -> None:
-    """At the lengths that servos of tendons reach, with six hinges a segment, pulls and pushes are within 2 % of ours."""
-    mujoco = tool("mujoco")
-    arm = sr.load_model(sr.TendonArm(segment_lengths=THIN, kind="length", chain="lumped", hinges=6))
-    wanted = arm.relaxed_motors + 1e-3 * np.array([-2.0, 1.0, 1.0, -1.8, 0.9, 0.9])
-    data = mujoco_data(mujoco, to_mjcf(arm, wanted, gravity=sr.EARTH_GRAVITY))
+def test_a_robot_at_home_on_winches_stays_there(tool: Tool) -> None:
+    """Lumped lengths of ours and MuJoCo's differ at second order, by micrometres here."""
+    mujoco, case = tool("mujoco"), CASES["length"]
+    data = mujoco_data(mujoco, to_mjcf(case.load(chain="lumped", hinges=6), case.inputs))
+    assert np.array_equal(data.ctrl, case.inputs)
+    assert np.array_equal(winches(data), case.inputs)
+    tip = data.body("tip").xpos.copy()
     mujoco.mj_step(data.model, data, 1500)
-    found = sr.solve_equilibrium(arm, lengths(data, arm), gravity=sr.EARTH_GRAVITY)
-    assert found.motor_torques.min() < -1.0
-    assert np.abs(data.actuator_force - found.motor_torques).max() < 0.02 * np.abs(found.motor_torques).max()
+    assert np.linalg.norm(data.body("tip").xpos - tip) < 2e-3
+
+
+@pytest.mark.parametrize(("time_step", "stays"), [(0.0005, True), (0.009, True), (0.011, False)])
+def test_winches_are_stable_up_to_twice_their_lag(tool: Tool, time_step: float, stays: bool) -> None:
+    """The lag is 5 ms; all the motors jump by up to 6 % of their lengths at once."""
+    mujoco, arm = tool("mujoco"), sr.load_model(sr.TendonArm(segment_lengths=THIN, kind="length", chain="lumped", hinges=3))
+    data = mujoco_data(mujoco, to_mjcf(arm, gravity=sr.EARTH_GRAVITY))
+    data.model.opt.timestep = time_step
+    inputs = arm.relaxed_motors * (0.94, 1.03, 1.03, 0.94, 1.03, 1.03)
+    data.ctrl[:] = inputs
+    mujoco.mj_step(data.model, data, 1000)
+    assert bool(np.abs(winches(data) - inputs).max() < 1e-5) == stays
+
+
+def test_pressures_drive_mckibben_muscles_as_they_do_here(tool: Tool) -> None:
+    """The simulation comes to rest where our statics says, with an error of second order, and so do the tensions."""
+    mujoco, case, errors = tool("mujoco"), CASES["mckibben"], []
+    ours = sr.solve_equilibrium(case.load(elastic_sections=10), case.inputs, gravity=sr.EARTH_GRAVITY)
+    for hinges in (3, 6):
+        arm = case.load(chain="lumped", hinges=hinges)
+        data = mujoco_data(mujoco, to_mjcf(arm, gravity=sr.EARTH_GRAVITY, limits=False, damping=0.1))
+        data.ctrl[:] = case.inputs
+        mujoco.mj_step(data.model, data, 1500)
+        assert np.abs(data.qvel).max() < 1e-3
+        errors.append(float(np.linalg.norm(data.body("tip").xpos - ours.tip_position)))
+    assert errors[1] < 0.5 * errors[0] < 3e-3
+    square, least, braid = 3.0 / np.tan(0.4363) ** 2, 1.0 / np.sin(0.4363) ** 2, arm.muscles[0].braid_angle
+    assert abs(braid - 0.4363) < 1e-4
+    contraction = (square * (lengths(data, arm) / arm.structure.muscle_paths.rest) ** 2 - least) / (square - least)
+    assert np.abs(data.actuator_force * contraction / ours.muscle_forces - 1.0).max() < 0.01
 
 
 def test_what_a_simulator_does_not_have_is_refused_by_name() -> None:
@@ -299,8 +340,6 @@ def test_what_a_simulator_does_not_have_is_refused_by_name() -> None:
             to_pinocchio(model)
     with pytest.raises(sr.ParameterError, match="a winding route"):
         to_mjcf(helical, actuators="welded")
-    with pytest.raises(sr.ParameterError, match=r'muscle_1_1.*actuators="welded".*McKibben'):
-        to_mjcf(mckibben)
     with pytest.raises(sr.ParameterError, match="within the limits of tendon_1_1"):
         to_mjcf(elastic, (0.5, *MOTORS[1:]))
     loose = sr.load_model(sr.TendonArm(segment_lengths=THIN, tendon_stiffness=10.0, chain="lumped", hinges=2))

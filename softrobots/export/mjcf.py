@@ -25,9 +25,10 @@ from softrobots.export.mjcf_contact import (
     write_contact_defaults,
     write_obstacles,
 )
-from softrobots.export.mjcf_tendons import Sites, place_sites, write_drives, write_tendons
+from softrobots.export.mjcf_tendons import Sites, place_sites, write_drives, write_slides, write_tendons
 from softrobots.export.prepared import PreparedRobot, checked_gravity, neighbours, prepare, weld_groups
-from softrobots.export.servos import ANGLE_ERROR, LENGTH_ERROR, Motor
+from softrobots.export.servos import ANGLE_ERROR, Motor
+from softrobots.export.slides import TENDON_LAG
 from softrobots.export.tendons import SPRINGY, tendons_of
 from softrobots.export.xml_text import document
 from softrobots.model.soft_model import SoftModel
@@ -59,10 +60,11 @@ def to_mjcf(
 
     Driven motors are position actuators (`softrobots.export.servos`), whose joints have the damping at which the motor just
     reaches its largest speed under its largest torque, if `damping` is "critical". Actuators along the body are spatial tendons
-    (`softrobots.export.tendons`) with an actuator each, whose `ctrl` is the input and whose force is the tension, whatever the
-    kind; that of a given length is a servo. Welded, tensions and pressures are part of the springs, elastic actuators and
-    McKibben muscles are springs of tendons (the latter in MuJoCo 4 only, whose springs have polynomials). The keyframe `home`
-    holds the relaxed springs and `q_motors` as `ctrl`.
+    (`softrobots.export.tendons`) with an actuator each, whose `ctrl` is the input and whose force is the tension, that of a
+    McKibben muscle at its rest length; given lengths and these muscles are driven by slide joints beside the robot
+    (`softrobots.export.slides`). Welded, tensions and pressures are part of the springs, elastic actuators and McKibben muscles
+    are springs of tendons (the latter in MuJoCo 4 only, whose springs have polynomials). The keyframe `home` holds the relaxed
+    springs and `q_motors` as `ctrl`.
 
     In an environment, obstacles are geoms of the world with their names, and the capsules of the robot touch them, in place of
     the collision shapes of the URDF (`softrobots.export.contact_shapes`). `SOFTNESS` says how stiff.
@@ -86,8 +88,8 @@ def to_mjcf(
     Raises:
         NameNotFound: If `damping` names a joint that has no spring.
         ParameterError: If an argument does not fit, or the robot has sections of constant strain, springs that are not linear,
-            or actuators that MuJoCo does not have: driven McKibben muscles; welded, given lengths and tensions along winding
-            routes. If obstacles move, or friction is given without any.
+            or welded actuators that MuJoCo does not have: given lengths, and tensions along winding routes. If obstacles move,
+            or friction is given without any.
         DescriptionError: If the robot has moving links without mass or moments of inertia, a link with impossible
             moments, a link `world` that is not its root, or more joints than Pinocchio supports.
         OutputError: If the copy of a mesh cannot be written.
@@ -118,6 +120,7 @@ def to_mjcf(
     bodies = _Bodies(robot, limits, damping == "critical", assets, sites, MeshFiles(MeshFolder.of(mesh_folder)))
     world = ElementTree.SubElement(root, "worldbody")
     bodies.write(world)
+    slides = write_slides(world, tendons)
     if robot.contact is not None:
         write_obstacles(world, assets, robot.contact)
     if not len(assets):
@@ -128,8 +131,8 @@ def to_mjcf(
         for first, second in pairs:
             ElementTree.SubElement(contact, "exclude", {"body1": first, "body2": second})
     if tendons:
-        write_tendons(ElementTree.SubElement(root, "tendon"), tendons)
-    key = {"name": "home", "qpos": number_text(robot.home[name] for name in bodies.order)}
+        write_tendons(root, tendons)
+    key = {"name": "home", "qpos": number_text([*(robot.home[name] for name in bodies.order), *slides])}
     if actuators == "driven" and model.n_motors:
         driven = ElementTree.SubElement(root, "actuator")
         _write_motors(driven, robot.motors)
@@ -281,7 +284,13 @@ def _head(robot: PreparedRobot, driven: Sequence[ActuatorTag], meshes: MeshFiles
             f"Position actuators of motors give all their torque at an error of {ANGLE_ERROR} rad; statics holds exactly."
         )
     if any(tag.kind == "length" for tag in driven):
-        lines.append(f"Actuators of given length give all their force at an error of {LENGTH_ERROR} of their length at rest.")
+        lines.append(
+            f"Actuators of given length hang on winches beside the robot; time steps up to {2 * TENDON_LAG} s are stable."
+        )
+    if any(tag.kind == "mckibben" for tag in driven):
+        lines.append(
+            "McKibben muscles drive pistons beside the robot, whose force is the tension at rest length; none goes slack."
+        )
     if driven:
         lines.append("The ctrl of an actuator is its length, that of its motor [m], its tension [N] or pressure [Pa].")
     if robot.contact is not None:

@@ -1,13 +1,12 @@
-r"""Position servos in place of motors and of actuators of given length in a simulator.
+r"""Position servos in place of motors in a simulator.
 
 Statics holds an actuator exactly; a servo is compliant. Its gain is its largest force over a small error,
 
 .. math:: k_p = F / \varepsilon, \qquad k_v = 2 \sqrt{k_p I}
 
-and `k_v` damps it critically with the inertia `I` of the softest motion that moves this actuator by one unit at the home
-position: for a motor, all that it carries turns about its axis; for an actuator of given length, the springs along its route
-share its elongation as `K^{-1} A^T`. (A simulator that takes `I` from the inverse of the mass matrix, as MuJoCo's `dampratio`
-does, finds the body next to the motor, behind which the rest hangs on springs: a two-thousandth of it in the inflatable arm.)
+and `k_v` damps it critically with the inertia `I` of all that turns about its axis at the home position. (A simulator that
+takes `I` from the inverse of the mass matrix, as MuJoCo's `dampratio` does, finds the body next to the motor, behind which the
+rest hangs on springs: a two-thousandth of it in the inflatable arm.)
 """
 
 from __future__ import annotations
@@ -26,10 +25,8 @@ from softrobots.model.soft_model import SoftModel
 ANGLE_ERROR = 1e-2
 """Error at which the servo of a revolute motor reaches its full torque [rad]."""
 
-LENGTH_ERROR = 1e-3
-"""The same for an actuator of given length, relative to its rest length, and for a prismatic motor, relative to its travel."""
-
-_UNLIMITED = 1e3  # gain without a limit, over the stiffness of the stiffest spring, or of those along the route
+_TRAVEL_ERROR = 1e-3  # the same for a prismatic motor, relative to its travel
+_UNLIMITED = 1e3  # gain without a limit, over the stiffness of the stiffest spring
 
 
 class Servo(NamedTuple):
@@ -71,24 +68,11 @@ def motors_of(model: SoftModel, joints: Sequence[Joint], positions: Mapping[str,
     )
 
 
-def length_servo(model: SoftModel, place: int, mass: FloatArray) -> Servo:
-    """Return the servo of an actuator of given length, the one at `place` among them, for the mass matrix at home, (nv, nv)."""
-    structure, tag = model.structure, model.muscles[place]
-    springs, row = structure.spring_indices, structure.muscle_paths.matrix[place]
-    motion = row / structure.strain_springs.stiffness
-    softness = row @ motion
-    motion /= softness
-    inertia = float(motion @ mass[np.ix_(springs, springs)] @ motion)
-    force = max(abs(tag.weakest), tag.strongest)
-    gain = force / (LENGTH_ERROR * tag.rest_length) if force < LARGEST else _UNLIMITED / float(softness)
-    return Servo(gain, 2.0 * math.sqrt(gain * inertia), force)
-
-
 def _motor_servo(joint: Joint, stiffest: float, inertia: float) -> Servo:
     if not 0.0 < joint.effort < LARGEST:
         gain, force = _UNLIMITED * (stiffest or 1.0), math.inf
     else:
         travel = joint.limits[1] - joint.limits[0]
         slides = joint.kind == "prismatic" and 0.0 < travel < LARGEST
-        gain, force = joint.effort / (LENGTH_ERROR * travel if slides else ANGLE_ERROR), joint.effort
+        gain, force = joint.effort / (_TRAVEL_ERROR * travel if slides else ANGLE_ERROR), joint.effort
     return Servo(gain, 2.0 * math.sqrt(gain * inertia), force)

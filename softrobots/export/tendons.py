@@ -33,9 +33,8 @@ from softrobots.core.errors import ParameterError
 from softrobots.description.rigid_tree import Joint
 from softrobots.description.route_points import RoutePoint, route_points
 from softrobots.description.urdf_tags import ActuatorTag
-from softrobots.export.damping import mass_matrix
 from softrobots.export.prepared import PreparedRobot
-from softrobots.export.servos import Servo, length_servo
+from softrobots.export.slides import Piston, Winch, piston, winch
 from softrobots.model.actuator_laws import input_limits, pull_factors
 from softrobots.model.sections import SectionRow
 from softrobots.model.soft_model import SoftModel
@@ -92,6 +91,10 @@ class Spring(NamedTuple):
     """[N s/m]."""
 
 
+Law = Drive | Spring | Winch | Piston
+"""What gives a tendon its tension."""
+
+
 @dataclass(frozen=True, eq=False)
 class Tendon:
     """An actuator as a tendon, either driven or a spring."""
@@ -100,7 +103,7 @@ class Tendon:
     """Name of the actuator."""
     legs: tuple[Leg, ...]
     """Its course, base to tip."""
-    law: Drive | Spring
+    law: Law
     """Its tension."""
     home: float
     """Its input at home [m, N or Pa]."""
@@ -110,14 +113,11 @@ def tendons_of(model: SoftModel, robot: PreparedRobot, *, welded: bool) -> tuple
     """Return the tendons of a robot: driven actuators, or springs in place of those whose tension follows their length.
 
     Raises:
-        ParameterError: If MuJoCo has no such law: that of a driven McKibben muscle, or of an elastic actuator that is taut at
-            any length.
+        ParameterError: If MuJoCo has no such law: that of a welded elastic actuator that is taut at any length.
     """
     sections = model.structure.section_table
     hinges = [[joint for joint in robot.tree.joints if joint.name in row.joint_names] for row in sections]
     inputs = robot.q_motors[len(model.structure.motor_joints) :].tolist()
-    held = not welded and any(tag.kind == "length" for tag in model.muscles)
-    mass = mass_matrix(model, robot.q_motors) if held else np.zeros((0, 0))
     time, tendons = robot.damping_time or 0.0, []
     for place, (tag, value) in enumerate(zip(model.muscles, inputs, strict=True)):
         if welded and tag.kind not in SPRINGY:
@@ -125,9 +125,13 @@ def tendons_of(model: SoftModel, robot: PreparedRobot, *, welded: bool) -> tuple
         legs = _legs(tag, sections, hinges)
         beyond = float(model.structure.muscle_paths.rest[place]) - math.fsum(leg.rest_length for leg in legs)
         if welded:
-            law: Drive | Spring = _spring(tag, value, beyond, time)
+            law: Law = _spring(tag, value, beyond, time)
+        elif tag.kind == "length":
+            law = winch(model, place, beyond)
+        elif tag.kind == "mckibben":
+            law = piston(tag, sum(body.mass for body in robot.tree.bodies))
         else:
-            law = _drive(tag, beyond, time, length_servo(model, place, mass) if tag.kind == "length" else None)
+            law = _drive(tag, beyond, time)
         tendons.append(Tendon(tag.name, legs, law, value))
     return tuple(tendons)
 
@@ -158,22 +162,13 @@ def _offset_and_tangent(point: RoutePoint, row: SectionRow) -> tuple[FloatArray,
     return offset, row.length * tangent
 
 
-def _drive(tag: ActuatorTag, beyond: float, time: float, servo: Servo | None) -> Drive:
+def _drive(tag: ActuatorTag, beyond: float, time: float) -> Drive:
     """The law of a driven actuator, which is by `beyond` [m] longer than its tendon, with a damping time [s]."""
     inputs = input_limits(tag)
-    if tag.kind == "tension":
-        return Drive(1.0, 0.0, 0.0, 0.0, (-math.inf, math.inf), inputs)
-    if tag.kind == "pressure":
-        return Drive(-tag.area, 0.0, 0.0, 0.0, (-math.inf, math.inf), inputs)
-    if tag.kind == "elastic":
-        stiffness, damping, limits = tag.stiffness, time * tag.stiffness, (0.0, tag.strongest)
-    elif servo is not None:
-        stiffness, damping, limits = servo.gain, servo.damping, (-servo.force, servo.force)  # it pushes, as in statics
-    else:
-        requirement = 'actuators="welded": no actuator of MuJoCo pulls by pressure times (a l^2 - b), as McKibben muscles do'
-        raise ParameterError("actuators", f"driven, with {tag.name}", requirement)
-    constant = tag.pretension + stiffness * beyond
-    return Drive(-stiffness, constant, stiffness, damping, limits, inputs)
+    if tag.kind != "elastic":
+        return Drive(1.0 if tag.kind == "tension" else -tag.area, 0.0, 0.0, 0.0, (-math.inf, math.inf), inputs)
+    constant = tag.pretension + tag.stiffness * beyond
+    return Drive(-tag.stiffness, constant, tag.stiffness, time * tag.stiffness, (0.0, tag.strongest), inputs)
 
 
 def _spring(tag: ActuatorTag, value: float, beyond: float, time: float) -> Spring:
