@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots.description.third_party import robot_file
 from softrobots.view.browser import show_share
-from softrobots.view.camera import whole_view
+from softrobots.view.camera import narrowest, whole_view
 
 WINDOWS = (1200, 500), (800, 600), (380, 760)
 """Wide, as a screen, and as a phone [px]."""
@@ -83,6 +83,7 @@ def test_the_whole_robot_is_in_every_window(
         page.close()
         assert np.abs(places).max() <= 1.0, size
         assert np.max(places[2:] - places[:2]) > 0.4, size
+        assert name != "pcc" or places[3] - places[1] > 1.2, "an upright robot is as high in narrow windows"
 
 
 def test_keys_turn_zoom_and_pause(browser: object, tmp_path: Path) -> None:
@@ -138,3 +139,7 @@ def test_no_point_is_outside_of_the_picture(points: list[tuple[float, ...]], awa
     rounding = 1e-12
     assert np.all(np.abs((corners - eye) @ np.cross(back, right)) <= half * depth + rounding)
     assert np.all(np.abs((corners - eye) @ right) <= 1.4 * half * depth + rounding)
+    least = narrowest(corners, eye, middle)
+    assert least <= 1.4 + 1e-6
+    slopes = np.abs((corners - eye) @ right) / np.maximum(depth, 1e-9)  # a point may be at the eye
+    assert np.max(slopes) == pytest.approx(0.9 * least * half, abs=1e-6)  # a tenth is left

@@ -7,7 +7,8 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 
 _FIELD = np.tan(0.5 * np.deg2rad(75.0))  # of meshcat's camera: height of the half picture at unit distance
-_WIDTH = 1.4  # of the picture over its height; in narrower windows `fit.js` makes everything smaller
+WIDTH = 1.4
+"""Width of a picture over its height in which `whole_view` has all; in narrower windows `fit.js` makes everything smaller."""
 _FILLED = 0.9  # share of the picture that may be filled
 
 
@@ -26,13 +27,23 @@ def whole_view(points: FloatArray, away: FloatArray) -> tuple[FloatArray, FloatA
     Returns:
         Its place and the point that it looks at, shape (3,) [m].
     """
-    middle = 0.5 * (points.min(axis=0) + points.max(axis=0))
-    distance = float(np.linalg.norm(away))
-    back = away / distance
+    middle, distance = 0.5 * (points.min(axis=0) + points.max(axis=0)), float(np.linalg.norm(away))
+    depth, wide, high = _seen(points - middle, away)
+    needed = depth + np.maximum(np.abs(high), np.abs(wide) / WIDTH) / (_FIELD * _FILLED)
+    return middle + max(distance, float(needed.max())) / distance * away, middle
+
+
+def narrowest(points: FloatArray, eye: FloatArray, middle: FloatArray) -> float:
+    """Return the least width over height of a picture of a camera of `whole_view` that has all points in it."""
+    depth, wide, _ = _seen(points - eye, eye - middle)
+    return float(np.max(np.abs(wide) / np.maximum(-depth, 1e-9)) / (_FIELD * _FILLED))
+
+
+def _seen(points: FloatArray, away: FloatArray) -> FloatArray:
+    """Depth towards a camera in a direction, and places across and up its picture, shape (3, n) [m]."""
+    back = away / np.linalg.norm(away)
     aside = np.cross((0.0, 0.0, 1.0), back) / np.linalg.norm(back[:2])
-    depth, wide, high = np.stack([back, aside, np.cross(back, aside)]) @ (points - middle).T
-    needed = depth + np.maximum(np.abs(high), np.abs(wide) / _WIDTH) / (_FIELD * _FILLED)
-    return middle + max(distance, float(needed.max())) * back, middle
+    return np.asarray(np.stack([back, aside, np.cross(back, aside)]) @ points.T)
 
 
 def box_corners(low: FloatArray, high: FloatArray) -> FloatArray:

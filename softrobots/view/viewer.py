@@ -16,6 +16,7 @@ from softrobots.robots import HelixTube
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.view.animation_frames import Movement, playing_time
+from softrobots.view.camera import narrowest
 from softrobots.view.meshcat_page.page_text import legend_rows, live_page, page_text
 from softrobots.view.meshcat_page.robot import RobotDrawing
 from softrobots.view.meshcat_page.server import ServerProcess, connect, send_html
@@ -196,7 +197,8 @@ class Viewer(WrittenPage):
             ParameterError: If the shape differs or a number is not finite.
         """
         points = self._scenes.corners(self._robot.scenes)
-        self._stage.look_from(*self._scenes.extent.camera(finite_array("tip", tip, (3,), "m"), points))
+        eye, centre = self._scenes.extent.camera(finite_array("tip", tip, (3,), "m"), points)
+        self._stage.look_from(eye, centre, narrowest(points, eye, centre))
 
     def look_from(self, eye: Any, centre: Any) -> None:
         """Place the camera.

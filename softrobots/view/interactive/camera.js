@@ -48,6 +48,14 @@ class Camera {
       .addScaledVector(towards, middle[2]);
   }
 
+  // Whether something of the robot is outside of the window.
+  leaves() {
+    return this.points().some((point) => {
+      const { x, y } = point.project(this.camera);
+      return Math.max(Math.abs(x), Math.abs(y)) > 1;
+    });
+  }
+
   turn(right, up) {
     this.view.turn -= right;
     this.view.rise = Math.max(-1.5, Math.min(1.5, this.view.rise + up));
@@ -95,7 +103,7 @@ class Camera {
       this.camera.updateProjectionMatrix();
       this.refit = true;
     }
-    if (this.view.fit && this.refit) {
+    if (this.view.fit && (this.refit || (!this.held && this.leaves()))) {
       this.fit();
       this.refit = false;
     }

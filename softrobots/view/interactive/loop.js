@@ -17,6 +17,8 @@ addEventListener("hashchange", readAddress);
 let last = 0,
   slow = 0;
 function frame(now) {
+  if (scene.held && !dragging) scene.dirty = true; // let go of: the camera may follow
+  scene.held = dragging !== null; // under a pointer the picture stays
   if (dragging?.at && shown) {
     const target = scene.under(...dragging.at);
     if (target && (mode() === "force" ? pull(target) : reach(target))) refresh();

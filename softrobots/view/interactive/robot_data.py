@@ -23,46 +23,54 @@ from softrobots.view.slider_ranges import actuator_ends, slider_grid
 from softrobots.view.tension_scale import PULL_COLOURS, PUSH_COLOURS, ZERO_COLOUR
 
 POINTS = 12
-"""Frames along each section, the last at its end."""
+"""Frames that a solver places along each section of constant strain, the last at its end."""
 _DIGITS = 7  # of lengths [m]
 
 
 class ChainFrames:
     """Numbers of the frames that a solver places: behind each joint, at points along each section, the tip.
 
-    The starts of segments follow, which the page places itself.
+    Others follow, which the page places itself: the starts of segments, and the ends of sections that are joints in a row.
     """
 
     def __init__(self, model: SoftModel, chain: SerialChain, sections: BentSections) -> None:
         """Number the frames of a chain, base to tip."""
-        self._rows = {row.name: row for row in model.structure.section_table} if model.structure.constant_strain else {}
+        self._rows = {row.name: row for row in model.structure.section_table}
         self.of_joint: dict[str, int] = {}
         self.of_section: dict[str, list[int]] = {}
-        self.starts: list[dict[str, Any]] = []
-        count, segments = 0, {}
+        self.placed: list[dict[str, Any]] = []
+        count = 0
         for element in chain.elements:
             if isinstance(element, ChainSection):
-                row = self._rows[element.name]
-                if row.segment not in segments:
-                    segments[row.segment] = element.name
-                    pose = sections.frames(row.segment, np.zeros(1))[0]
-                    self.starts.append({"frame": count - 1, "pose": _rounded(pose)})
                 self.of_section[element.name] = list(range(count - 1, count + POINTS))
                 count += POINTS
-                self.of_joint[row.joint_names[-1]] = count - 1
+                self.of_joint[self._rows[element.name].joint_names[-1]] = count - 1
             else:
                 self.of_joint[element.name] = count
                 count += 1
-        for number, name in enumerate(segments.values(), start=count + 1):
-            self.of_section[name][0] = number
+
+        def place(frame: int, segment: int, at: float) -> int:
+            pose = sections.frames(segment, np.array([at]))[0]
+            self.placed.append({"frame": frame, "pose": _rounded(pose)})
+            return count + len(self.placed)
+
+        for segment in sections.segment_numbers:
+            rows, bounds = [row for row in self._rows.values() if row.segment == segment], sections.bounds(segment).tolist()
+            for number, row in enumerate(rows):
+                joints = [self.of_joint[name] for name in row.joint_names if name in self.of_joint]
+                numbers = self.of_section.setdefault(row.name, [min(joints) - 1])
+                numbers[0] = place(numbers[0], segment, 0.0) if number == 0 else self.of_section[rows[number - 1].name][-1]
+                if len(numbers) == 1:
+                    numbers.append(place(max(joints), segment, bounds[number + 1]))
 
     def of_segment(self, segment: int) -> tuple[list[int], FloatArray]:
         """Frames along a segment, and their rest lengths from its start [m]; each place once."""
         rows = [row for row in self._rows.values() if row.segment == segment]
         numbers, places = [self.of_section[rows[0].name][0]], [0.0]
         for row in rows:
-            numbers += self.of_section[row.name][1:]
-            places += (places[-1] + row.length * np.arange(1, POINTS + 1) / POINTS).tolist()
+            new = self.of_section[row.name][1:]
+            numbers += new
+            places += (places[-1] + row.length * np.arange(1, len(new) + 1) / len(new)).tolist()
         return numbers, np.array(places)
 
 
@@ -89,7 +97,7 @@ def robot_data(unloaded: Equilibrium, full_force: float) -> dict[str, Any]:
         "ground": extent.ground,
         "eye": _rounded(eye),
         "centre": _rounded(centre),
-        "starts": frames.starts,
+        "placed": frames.placed,
         "solids": _solids(scenes.robot, relaxed.deformed, model, frames),
         "tubes": _tubes(model, frames),
         "curves": _curves(model, sections, frames),
@@ -111,7 +119,7 @@ def _solids(robot: RobotShapes, poses: Sequence[FloatArray], model: SoftModel, f
     """The rigid shapes with their frames; pieces of the chain inside a section are not drawn, its tube is."""
     names, solids = model.pinocchio.names, []
     for shape, joint, pose in zip(robot.shapes, robot.joints, poses, strict=True):
-        if (joint and names[joint] not in frames.of_joint) or (shape.of_section and model.structure.constant_strain):
+        if (joint and names[joint] not in frames.of_joint) or shape.of_section:
             continue
         corners, faces, flat = triangles(shape.geometry)
         solids.append(
@@ -131,8 +139,6 @@ def _solids(robot: RobotShapes, poses: Sequence[FloatArray], model: SoftModel, f
 
 def _tubes(model: SoftModel, frames: ChainFrames) -> list[dict[str, Any]]:
     """One tube a segment; one a section where each is an inflated link of its own, which has a colour."""
-    if not model.structure.constant_strain:
-        return []
     groups = {model.spring_joints[group.springs[0]]: number for number, group in enumerate(model.spring_groups)}
     sections = model.structure.section_of
     links = {sections[name].name: number for name, number in groups.items() if name in sections}
@@ -149,8 +155,6 @@ def _tubes(model: SoftModel, frames: ChainFrames) -> list[dict[str, Any]]:
 
 def _curves(model: SoftModel, sections: BentSections, frames: ChainFrames) -> list[dict[str, Any]]:
     """The actuators, and lines that are only drawn: frames, and offsets in them."""
-    if not model.structure.constant_strain:
-        return []
     curves: list[dict[str, Any]] = []
     for tag, (radius, aside) in zip(model.muscles, thickness_and_shift(sections, model.muscles), strict=True):
         points: list[list[float]] = []

@@ -3,7 +3,7 @@ class RobotScene extends Camera {
   constructor(canvas, data) {
     super(canvas, data);
     const { wrinkling, rigid, tube, line } = data.colours;
-    this.starts = data.starts.map((start) => ({ ...start, local: new THREE.Matrix4().set(...start.pose) }));
+    this.placed = data.placed.map((one) => ({ ...one, local: new THREE.Matrix4().set(...one.pose) }));
     this.levels = wrinkling.map(([, rgb]) => look(colourOf(rgb)));
     this.solids = data.solids.map((solid) => rigidMesh(solid, solid.colour));
     this.rigid = data.solids.filter((solid) => solid.elastic).map((solid) => rigidMesh(solid, rigid));
@@ -43,17 +43,17 @@ class RobotScene extends Camera {
     return points;
   }
 
-  // Fixes shapes and starts of segments, which are given where they are at rest, to their frames there.
+  // Fixes shapes, and frames that the page places itself, which are given where they are at rest, to the solver's frames there.
   attach(frames) {
-    for (const { frame, local } of [...this.starts, ...this.solids, ...this.rigid])
+    for (const { frame, local } of [...this.placed, ...this.solids, ...this.rigid])
       if (frame >= 0) local.premultiply(placed(frames, frame).invert());
   }
 
-  // Frames with the starts of segments behind them.
+  // The solver's frames, and behind them those that the page places itself.
   #whole(frames) {
-    const all = new Float64Array(frames.length + 12 * this.starts.length);
+    const all = new Float64Array(frames.length + 12 * this.placed.length);
     all.set(frames);
-    this.starts.forEach(({ frame, local }, number) => {
+    this.placed.forEach(({ frame, local }, number) => {
       const { elements: e } = frame < 0 ? local : placed(frames, frame).multiply(local);
       all.set([e[0], e[4], e[8], e[1], e[5], e[9], e[2], e[6], e[10], e[12], e[13], e[14]], frames.length + 12 * number);
     });

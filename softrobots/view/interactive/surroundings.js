@@ -23,7 +23,7 @@ function surroundings(scene, { size, ground, centre, colours }) {
     lines.push(at, -size, ground, at, size, ground, -size, at, ground, size, at, ground);
   }
   const floor = new THREE.BufferGeometry().setAttribute("position", new THREE.Float32BufferAttribute(lines, 3));
-  const sheet = new THREE.Mesh(new THREE.PlaneGeometry(6 * size, 6 * size), new THREE.ShadowMaterial({ opacity: 0.16 }));
+  const sheet = new THREE.Mesh(new THREE.PlaneGeometry(6 * size, 6 * size), new THREE.ShadowMaterial({ opacity: 0.16, depthWrite: false }));
   sheet.position.set(centre[0], centre[1], ground - 1e-3 * size);
   sheet.receiveShadow = true;
   scene.add(

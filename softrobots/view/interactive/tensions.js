@@ -29,10 +29,10 @@ function showTensions({ tensions }) {
     slack = tensions.map((one, muscle) => data.elastic[muscle] && one <= 0);
   tensions.forEach((tension, muscle) => {
     const told = Math.abs(tension) < 1e-9 * end ? 0 : tension,
-      curve = scene.curves[muscle]?.drawn; // a lumped robot has none
+      curve = scene.curves[muscle].drawn;
     tensionWords[muscle].textContent = slack[muscle] ? "slack" : tensionInWords(told);
-    curve?.mesh.material.color.setRGB(...tensionColour(tension, end));
-    curve?.dash(slack[muscle]);
+    curve.mesh.material.color.setRGB(...tensionColour(tension, end));
+    curve.dash(slack[muscle]);
   });
   const shares = [
     ...(Math.max(...tensions) > 0 ? [1, 0.5] : []),
@@ -43,7 +43,7 @@ function showTensions({ tensions }) {
   const grey = css(data.colours.zero);
   if (slack.includes(true)) entries.push([`repeating-linear-gradient(90deg, ${grey} 0 4px, #fff 4px 7px)`, "slack"]);
   $("tensions").replaceChildren(
-    ...(scene.curves.length ? entries : []).map(([background, words]) => {
+    ...entries.map(([background, words]) => {
       const line = document.createElement("div"),
         swatch = document.createElement("span");
       swatch.style.background = background;

@@ -1,4 +1,4 @@
-    const fit = () => { viewer.camera.zoom = Math.min(1, innerWidth / innerHeight / 1.4); viewer.set_dirty(); };
+    const fit = () => { viewer.camera.zoom = Math.min(1, innerWidth / innerHeight / (viewer.camera.narrowest ?? 1.4)); viewer.set_dirty(); };
     addEventListener("resize", fit);
     const folding = document.querySelector("#softrobots-legend details"), narrow = innerWidth <= 640;
     folding.open = !narrow;

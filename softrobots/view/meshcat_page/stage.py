@@ -9,6 +9,7 @@ import numpy as np
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.view.appearance import FLOOR_COLOUR
+from softrobots.view.camera import WIDTH
 from softrobots.view.scene import Extent
 
 
@@ -33,8 +34,8 @@ class Stage:
         lines = geometry.PointsGeometry(extent.floor().T.astype(np.float32))
         self._root["floor"].set_object(geometry.LineSegments(lines, geometry.LineBasicMaterial(color=FLOOR_COLOUR)))
 
-    def look_from(self, eye: Any, centre: Any) -> None:
-        """See `softrobots.view.viewer.Viewer.look_from`.
+    def look_from(self, eye: Any, centre: Any, narrowest: float = WIDTH) -> None:
+        """See `softrobots.view.viewer.Viewer.look_from`; `narrowest` is that of `softrobots.view.camera`.
 
         Raises:
             ParameterError: If a shape differs, a number is not finite, or both are the same point.
@@ -48,4 +49,6 @@ class Stage:
         self._root.set_transform(shift)
         x, y, z = away.tolist()
         # meshcat's camera has y up: (x, z, -y) of the scene.
-        self._page["/Cameras/default/rotated/<object>"].set_property("position", [x, z, -y])
+        camera = self._page["/Cameras/default/rotated/<object>"]
+        camera.set_property("position", [x, z, -y])
+        camera.set_property("narrowest", narrowest)  # read by `fit.js`
