@@ -264,7 +264,7 @@ def run(arguments: argparse.Namespace) -> None:
             make, title = SCENES[name]
             with tempfile.TemporaryDirectory() as folder, make() as viewer:
                 page = viewer.write_html(Path(folder) / "scene.html", title=title)
-                take_picture(page, target, width=1000, height=560)
+                take_picture(page, target, width=740, height=414, scale=1.5, aside=0.1)
         print(target)
 
 

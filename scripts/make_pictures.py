@@ -36,6 +36,10 @@ ANIMATION = "inflatable_arm.gif"
 """The moving picture at the top of the README, of the exhibit of that name."""
 
 
+WINDOW = {"width": 740, "height": 414, "scale": 1.5}
+"""Where pages are photographed [px]: print of 13 px is 7 px high in a picture that is shown 400 px wide."""
+
+
 def main(argv: list[str] | None = None) -> int:
     """Photograph each robot under load."""
     parser = argparse.ArgumentParser(description=__doc__)
@@ -54,7 +58,7 @@ def main(argv: list[str] | None = None) -> int:
             if name in LIVE_PAGES:
                 with tempfile.TemporaryDirectory() as folder_name:
                     page = LIVE_PAGES[name].write(Path(folder_name) / "page.html")
-                    print(take_picture(page, target, width=1000, height=560))
+                    print(take_picture(page, target, **WINDOW | {"height": 520}))
                 continue
             exhibit = EXHIBITS[name.removesuffix(".gif")]
             with tempfile.TemporaryDirectory() as folder_name, exhibit.make() as viewer:
@@ -62,7 +66,7 @@ def main(argv: list[str] | None = None) -> int:
                 if name == ANIMATION:
                     print(take_animation(page, target, width=720, height=400, progress=name))
                 else:
-                    print(take_picture(page, target, width=1000, height=560, share=exhibit.share))
+                    print(take_picture(page, target, share=exhibit.share, aside=0.1, **WINDOW))
 
     return exit_status(photograph)
 

@@ -55,7 +55,16 @@ def open_browser() -> Iterator[Any]:
             browser.close()
 
 
-def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height: int = 640, share: float = 0.0) -> Path:
+def take_picture(
+    html: str | Path,
+    png: str | Path,
+    *,
+    width: int = 1000,
+    height: int = 640,
+    scale: float = 1.0,
+    aside: float = 0.0,
+    share: float = 0.0,
+) -> Path:
     """Write a picture of a self-contained viewer page.
 
     Args:
@@ -63,6 +72,8 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
         png: File to write; an existing one is replaced.
         width: Width [px].
         height: Height [px].
+        scale: Pixels of the picture for each of them; in a narrower window with a larger scale text is larger.
+        aside: Share of the width by which the robot of a viewer page is moved to the right, off its legend [-].
         share: Share of the animation at which it is stopped, from 0 (start) to 1 (end) [-].
 
     Returns:
@@ -73,14 +84,17 @@ def take_picture(html: str | Path, png: str | Path, *, width: int = 1000, height
         OutputError: If the picture cannot be written.
         MissingDependency: If Playwright is not installed.
     """
-    with open_page(html, png, width, height) as (page, target):
+    with open_page(html, png, width, height, scale) as (page, target):
+        if aside:
+            page.wait_for_function("() => window.viewer")
+            page.evaluate(_ASIDE, aside)
         show_share(page, share)
         shot = page.screenshot()
     return write_bytes(target, shot, overwrite=True)
 
 
 @contextlib.contextmanager
-def open_page(html: str | Path, picture: str | Path, width: int, height: int) -> Iterator[tuple[Any, Path]]:
+def open_page(html: str | Path, picture: str | Path, width: int, height: int, scale: float = 1.0) -> Iterator[tuple[Any, Path]]:
     """Open a page in a window of a size [px] with its controls hidden; arguments and errors are those of `take_picture`.
 
     Yields:
@@ -91,7 +105,7 @@ def open_page(html: str | Path, picture: str | Path, width: int, height: int) ->
         raise ViewerError(f"{page_file} is no file; a page written by Viewer.write_html is required")
     target = new_file(picture, overwrite=True)
     with open_browser() as browser:
-        page = browser.new_page(viewport={"width": width, "height": height})
+        page = browser.new_page(viewport={"width": width, "height": height}, device_scale_factor=scale)
         page.goto(page_file.resolve().as_uri())
         page.add_style_tag(content="#softrobots-hint, #hint, #toggle, .dg { display: none !important; }")
         yield page, target
@@ -121,6 +135,7 @@ _SETTLED = """async () => {
   }
   return true;
 }"""
+_ASIDE = "share => viewer.camera.setViewOffset(innerWidth, innerHeight, -share * innerWidth, 0, innerWidth, innerHeight)"
 _FRAMES = "() => new Promise(done => requestAnimationFrame(() => requestAnimationFrame(() => done(true))))"
 _TWO_FRAMES = """() => new Promise(done => {
   viewer.set_dirty();
