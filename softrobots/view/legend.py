@@ -22,11 +22,10 @@ from softrobots.view.appearance import (
 )
 from softrobots.view.robot_shapes import Shape
 from softrobots.view.scene import WRINKLING_COLOURS, Arrow, Scene
-from softrobots.view.tension_scale import ZERO_COLOUR, DrawnActuator, scale_end, tension_colour
+from softrobots.view.tension_scale import ZERO, ZERO_COLOUR, DrawnActuator, scale_end, tension_colour
 
 _MOST_NAMED = 12  # actuators that are listed one by one
 _NO_FORCE = 1e-9  # [N], contacts with less only touch
-_ZERO = 1e-9  # of the end of the scale: tensions below are told as zero
 
 
 class LegendEntry(NamedTuple):
@@ -150,7 +149,7 @@ def tension_entries(states: Sequence[Sequence[DrawnActuator]]) -> list[LegendEnt
 
 def _entry(name: str, states: Sequence[DrawnActuator], end: float) -> LegendEntry:
     """The entry of one actuator in some states, on a scale with an end [N]."""
-    tensions = [0.0 if abs(one.tension) < _ZERO * end else one.tension for one in states if one.tension is not None]
+    tensions = [0.0 if abs(one.tension) < ZERO * end else one.tension for one in states if one.tension is not None]
     slack = all(one.slack for one in states)
     words = "slack" if slack else _words(min(tensions), max(tensions))
     return LegendEntry(tension_colour(max(tensions, key=abs), end), f"{name}: {words}", slack)

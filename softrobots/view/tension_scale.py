@@ -18,7 +18,10 @@ PUSH_COLOURS = ((0.98, 0.65, 0.28), (0.66, 0.22, 0.00))
 ZERO_COLOUR = (0.45, 0.45, 0.45)
 """Grey of an actuator without tension."""
 
-_NEUTRAL = 1e-3  # of the end of the scale: weaker tensions are grey
+NEUTRAL = 1e-3
+"""Share of the end of the scale below which a tension is grey."""
+ZERO = 1e-9
+"""Share of the end of the scale below which a tension is told as zero."""
 
 
 class DrawnActuator(NamedTuple):
@@ -57,7 +60,7 @@ def scale_end(tensions: Iterable[float | None]) -> float:
 def tension_colour(tension: float | None, end: float) -> tuple[float, float, float, float]:
     """Return the colour of a tension [N] on a scale with an end [N]; grey where it is not known."""
     share = 0.0 if tension is None else min(abs(tension) / end, 1.0)
-    if tension is None or share < _NEUTRAL:
+    if tension is None or share < NEUTRAL:
         return *ZERO_COLOUR, 1.0
     ends = zip(*(PULL_COLOURS if tension > 0.0 else PUSH_COLOURS), strict=True)
     red, green, blue = (light + share * (dark - light) for light, dark in ends)

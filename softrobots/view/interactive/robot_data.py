@@ -20,7 +20,7 @@ from softrobots.view.mesh_triangles import triangles
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.scene import WRINKLING_COLOURS, SceneBuilder
 from softrobots.view.slider_ranges import actuator_ends, slider_grid
-from softrobots.view.tension_scale import PULL_COLOURS, PUSH_COLOURS, ZERO_COLOUR
+from softrobots.view.tension_scale import NEUTRAL, PULL_COLOURS, PUSH_COLOURS, ZERO, ZERO_COLOUR
 
 POINTS = 12
 """Frames that a solver places along each section of constant strain, the last at its end."""
@@ -101,6 +101,7 @@ def robot_data(unloaded: Equilibrium, full_force: float) -> dict[str, Any]:
         "solids": _solids(scenes.robot, relaxed.deformed, model, frames),
         "tubes": _tubes(model, frames),
         "curves": _curves(model, sections, frames),
+        "tensions": {"neutral": NEUTRAL, "zero": ZERO},
         "colours": {
             "wrinkling": [[least if math.isfinite(least) else -1e9, rgb] for least, rgb in WRINKLING_COLOURS],
             "rigid": appearance.RIGID_COLOUR,

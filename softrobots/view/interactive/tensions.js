@@ -17,18 +17,21 @@ function tensionColour(tension, end) {
   const { pull, push, zero } = data.colours,
     share = Math.min(Math.abs(tension) / end, 1),
     [light, dark] = tension > 0 ? pull : push;
-  return share < 1e-3 ? zero : light.map((one, part) => one + share * (dark[part] - one));
+  return share < data.tensions.neutral ? zero : light.map((one, part) => one + share * (dark[part] - one));
 }
 
-const tensionInWords = (tension) =>
-  tension === 0 ? "0 N" : `${tension > 0 ? "pulls" : "pushes"} ${Number(Math.abs(tension).toPrecision(3))} N`;
+const tensionInWords = (tension) => {
+  const size = Math.abs(tension),
+    told = size < 1000 ? Number(size.toPrecision(3)) : Math.round(size);
+  return tension === 0 ? "0 N" : `${tension > 0 ? "pulls" : "pushes"} ${told} N`;
+};
 
 function showTensions({ tensions }) {
   if (!tensions.length) return;
   const end = scaleEnd(tensions),
     slack = tensions.map((one, muscle) => data.elastic[muscle] && one <= 0);
   tensions.forEach((tension, muscle) => {
-    const told = Math.abs(tension) < 1e-9 * end ? 0 : tension,
+    const told = Math.abs(tension) < data.tensions.zero * end ? 0 : tension,
       curve = scene.curves[muscle].drawn;
     tensionWords[muscle].textContent = slack[muscle] ? "slack" : tensionInWords(told);
     curve.mesh.material.color.setRGB(...tensionColour(tension, end));
