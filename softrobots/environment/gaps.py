@@ -14,6 +14,7 @@ the obstacle (edges, rims), which hold a core that lies flat, where the nearest 
 
 from __future__ import annotations
 
+import math
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -140,7 +141,7 @@ class Gaps:
             by_moment=None,
             gravity_derivative=None,
             potential=-float(vectors.ravel().dot(points.ravel())),
-            scale=self._reach * float(np.sqrt(np.einsum("ij,ij->i", vectors, vectors)).sum()),
+            scale=self._reach * sum(map(math.hypot, *vectors.T.tolist())),
         )
 
     def curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:

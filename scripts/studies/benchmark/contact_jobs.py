@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 from collections.abc import Mapping, Sequence
@@ -31,6 +32,8 @@ from studies.interop.mujoco_statics import obstacle_forces
 PEGS, SECTIONS = 10, 30
 """Pegs under the rod, and its sections."""
 AS_EXPORTED = "MuJoCo settling, file as exported"
+LOOSELY = "MuJoCo settling, file as exported, stopped as soon as all forces are within 0.001"
+_LOOSE = tuple(10.0**-power for power in range(1, 11))  # out of balance over force times reach, to stop at
 _MOTORS = (0.3, 0.6, -0.8)  # of the arm [rad]
 _PUSH, _TOUCH = 18.03, 0.02  # force on the tip of the arm [N], and distance of the wall from it, unloaded [m]
 _ASIDE = 9.81  # weight of the rod, across it [m/s^2]
@@ -146,13 +149,13 @@ def contact(settings: Settings) -> Outcome:
     for scene in (leaning_arm(settings.singles), lying_rod(max(2, settings.singles // 20), 3 if settings.quick else SECTIONS)):
         comparison = Comparison(settings, scene.name)
         comparison.add(GENERAL, partial(_ours, scene))
-        for name in (AS_EXPORTED, MUJOCO, MUJOCO_ANY):
+        for name in (AS_EXPORTED, LOOSELY, MUJOCO, MUJOCO_ANY):
             comparison.add(name, partial(_settling, name, settings, scene, notes))
         comparison.run()
         values = comparison.seconds[GENERAL] if GENERAL in comparison.seconds else comparison.absent[GENERAL]
         rows.append(dataclasses.replace(figure(scene.name, GENERAL, "s", values, AT_MOST, scene.target), clock="CPU"))
         rows.append(comparison.cheaper(scene.name, GENERAL, AS_EXPORTED, AT_LEAST, 20.0))
-        rows += [comparison.cheaper(scene.name, GENERAL, name) for name in (MUJOCO, MUJOCO_ANY)]
+        rows += [comparison.cheaper(scene.name, GENERAL, name) for name in (LOOSELY, MUJOCO, MUJOCO_ANY)]
     return Outcome(rows, notes=notes)
 
 
@@ -162,10 +165,22 @@ def _ours(scene: Scene) -> Workload:
 
 
 def _settling(name: str, settings: Settings, scene: Scene, notes: list[str]) -> Workload:
-    """MuJoCo as the file says, or with the best settings of the grid; its forces are those of our solver on its robot."""
+    """MuJoCo as the file says, or with the best settings of the grid; its forces are those of our solver on its robot.
+
+    It stops where it is out of balance by less than 1e-10 of force times reach, as our solver does, or at the coarsest power of
+    ten with which all forces of the cases that are checked are right.
+    """
     simulator, said = SettlingSurroundings(scene), ""
     if name == AS_EXPORTED:
         steps, apart = _checked(simulator, scene, name)
+    elif name == LOOSELY:
+        for simulator.tolerance in _LOOSE:
+            said = f", at {simulator.tolerance:g} of force times reach out of balance"
+            with contextlib.suppress(SoftRobotsError):
+                steps, apart = _checked(simulator, scene, name)
+                break
+        else:
+            raise NotConverged(f"{name}: at no criterion", best=None, residual=math.inf, iterations=0)
     else:
         time_steps = TIME_STEPS if name == MUJOCO else (*TIME_STEPS, *LARGE_STEPS)
         some = scene.cases.first(max(1, min(_TUNED, len(scene.cases.forces) // 5)))

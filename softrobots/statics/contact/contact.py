@@ -79,15 +79,16 @@ def contact_at(
 ) -> Contact:
     """Return the contact of a candidate, with its normal force [N], friction, shape (3,) [N], status and slip."""
     link, obstacle, with_itself = surroundings.pair(gaps, place)
+    core, normal, gap, radius = gaps.core_points[place], gaps.normals[place], float(gaps.values[place]), gaps.radii[place]
     return Contact(
         link=link,
         obstacle=obstacle,
-        point=gaps.points[place].copy(),
-        obstacle_point=gaps.obstacle_points[place].copy(),
-        normal=gaps.normals[place].copy(),
+        point=core - radius * normal,
+        obstacle_point=core - (gap + radius) * normal,
+        normal=normal.copy(),
         normal_force=normal_force,
-        force=normal_force * gaps.normals[place] + friction,
-        gap=float(gaps.values[place]),
+        force=normal_force * normal + friction,
+        gap=gap,
         strict=status != TOUCHING,
         status=status,
         slip=slip.copy(),

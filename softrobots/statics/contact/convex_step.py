@@ -15,7 +15,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.statics.contact.quadratic_programme import solve_guessed, solve_programme
-from softrobots.statics.elastic_state import norm, positive, scaled
+from softrobots.statics.elastic_state import norm, positive
 
 _LEAST = 1e-3  # least curvature along which a step is taken, relative to the springs
 _PRICE = 1e3  # of penetration in a step that cannot repair all of it, over usual energies in the box
@@ -61,7 +61,7 @@ def contact_step(
     soft = 1.0 / np.sqrt(stiffness)
     gradients, (longest, damping) = rows * soft, limits
     pull = soft * load
-    relative = scaled(hessian, stiffness)
+    relative = soft[:, None] * hessian * soft
     if damping:
         relative = relative + damping * np.eye(len(soft))
     convex, shift, exact = _convex(relative, gaps, gradients, held, factors)

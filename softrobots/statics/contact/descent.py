@@ -79,8 +79,8 @@ class ContactSearch:
         touch = state.touch
         if touch is None or not math.isfinite(state.energy):
             return None
-        pressed = touch.forces.nonzero()[0]
-        gap = max(touch.penetration, float(touch.gaps.values.take(pressed).max()) if len(pressed) else 0.0)
+        pressed = touch.forces.nonzero()[0] if forces.entries else ()
+        gap = max(touch.penetration, *touch.gaps.values[pressed].tolist()) if len(pressed) else touch.penetration
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
         return Near(state, touch, max(state.error / allowed, gap / (_EXACT * self._reach)), seen)
 

@@ -53,30 +53,32 @@ def solve_guessed(
     Returns:
         As `solve_programme`; None if the guess is wrong, or the rows nearly depend on each other.
     """
-    solution, multipliers = -factors.solve(pull).ravel(), np.zeros(len(bounds))  # Eigen returns one row as a matrix
-    lacking = bounds - gradients.dot(solution)
-    chosen = held.nonzero()[0]
+    free, chosen = -factors.solve(pull).ravel(), held.nonzero()[0]  # Eigen returns one row as a matrix
+    lacking, multipliers = bounds - gradients.dot(free), np.zeros(len(bounds))
     if not len(chosen):
-        chosen = lacking.argmax(keepdims=True) if len(lacking) else chosen
-        if not len(chosen) or lacking[chosen[0]] <= 0.0:
-            return solution, multipliers
-    rows, lacking = gradients.take(chosen, 0), lacking.take(chosen)
-    gives = factors.solve(rows.T).reshape(len(pull), -1)
-    across = rows.dot(gives)
-    if len(chosen) == 1:
-        forces = lacking / across[0] if across[0, 0] > 0.0 else -lacking
-    else:
-        sizes = np.sqrt(np.maximum(across.diagonal(), 1e-300))
-        values, vectors = np.linalg.eigh(across / sizes / sizes[:, None])
-        if not values[0] > _INDEPENDENT:
-            return None
-        forces = (vectors @ ((vectors.T @ (lacking / sizes)) / values)) / sizes
-    if forces.min() < 0.0:
+        if not len(bounds) or lacking.max() <= 0.0:
+            return free, multipliers
+        chosen = lacking.argmax(keepdims=True)
+    rows = gradients.take(chosen, 0)
+    gives = factors.solve(rows.T).reshape(len(free), -1)
+    forces = _independent(rows.dot(gives), lacking.take(chosen))
+    if forces is None or forces.min() < 0.0:
         return None
-    solution, multipliers[chosen] = solution + gives.dot(forces), forces
+    solution, multipliers[chosen] = free + gives.dot(forces), forces
+    if len(chosen) == len(bounds):
+        return solution, multipliers
     broken = gradients.dot(solution) - bounds < -_BROKEN * np.sqrt(np.einsum("ij,ij->i", gradients, gradients))
     broken[chosen] = False
     return None if broken.any() else (solution, multipliers)
+
+
+def _independent(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
+    """Solve with the matrix of the products of some rows; None if they nearly depend on each other."""
+    if len(right) == 1:
+        return right / matrix[0] if matrix[0, 0] > 0.0 else None
+    sizes = np.sqrt(np.maximum(matrix.diagonal(), 1e-300))
+    values, vectors = np.linalg.eigh(matrix / sizes / sizes[:, None])
+    return (vectors @ ((vectors.T @ (right / sizes)) / values)) / sizes if values[0] > _INDEPENDENT else None
 
 
 def _by_rows(
