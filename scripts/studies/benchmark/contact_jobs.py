@@ -32,7 +32,7 @@ from studies.interop.mujoco_statics import obstacle_forces
 PEGS, SECTIONS = 10, 30
 """Pegs under the rod, and its sections."""
 AS_EXPORTED = "MuJoCo settling, file as exported"
-LOOSELY = "MuJoCo settling, file as exported, stopped as soon as all forces are within 0.001"
+LOOSELY = "MuJoCo settling, file as exported, forces within 0.001"
 _LOOSE = tuple(10.0**-power for power in range(1, 11))  # out of balance over force times reach, to stop at
 _MOTORS = (0.3, 0.6, -0.8)  # of the arm [rad]
 _PUSH, _TOUCH = 18.03, 0.02  # force on the tip of the arm [N], and distance of the wall from it, unloaded [m]
