@@ -63,13 +63,14 @@ def find_candidates(
             _leave_out_base(touching, field, cores, ends, distances)
         if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
             near, which = touching.nonzero()
-            new = _ends(field, cores, ends, near, which, distances[near, which], field.normals.take(which, 0))
+            values = distances.take(near * len(numbers) + which)
+            new = _ends(field, cores, ends, near, which, values, field.normals.take(which, 0))
         else:
             # the distance changes by at most the length of the way: what is far at both ends is far between them
             far = distances.take(cores.end_numbers, 0).sum(axis=1) > (2.0 * limits + cores.long_ways)[:, None]
             new = _near(field, cores, places, ends, touching, (~far).nonzero(), limits, merged)
         if len(new.capsules):
-            found.append(new._replace(obstacles=numbers.take(new.obstacles)))
+            found.append(Candidates(new.parts, new.capsules, numbers.take(new.obstacles), *new[3:]))
     if pairs is not None:
         found.append(_own(cores, places, pairs, ends, limits, margin, merged, sum(len(numbers) for _, numbers in fields)))
     if len(found) == 1:

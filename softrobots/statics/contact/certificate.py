@@ -8,6 +8,7 @@ positive definite matrix on a null space; with them a matrix that is positive on
 
 from __future__ import annotations
 
+import math
 from itertools import chain, combinations
 from typing import Any, NamedTuple
 
@@ -74,7 +75,7 @@ def softest_motion(
         unit length in coordinates in which the springs have stiffness 1. Of more than 8 touches without force, or where a
         curvature of zero or less is that of several motions, the touches are left out: the answer is a lower bound.
     """
-    if not np.isfinite(tangent).all():
+    if not math.isfinite(float(tangent.sum())):
         return -np.inf, np.zeros(len(stiffness))
     soft = 1.0 / np.sqrt(stiffness)
     relative = soft[:, None] * tangent * soft

@@ -47,16 +47,13 @@ class Near(NamedTuple):
     """Largest of residual, penetration and gaps of forces, relative to what is required; 1 or less at an equilibrium."""
     seen: float
     """Gaps below this share of the reach are seen."""
+    load: FloatArray
+    """Out-of-balance load without the contact forces, shape (n_springs,)."""
 
     @property
     def table(self) -> ForceTable:
         """Its contact forces."""
         return ForceTable.of(self.touch.gaps, self.touch.forces)
-
-    @property
-    def load(self) -> FloatArray:
-        """Out-of-balance load without the contact forces, shape (n_springs,)."""
-        return self.state.residual + self.touch.pushes
 
 
 class ContactSearch:
@@ -80,9 +77,10 @@ class ContactSearch:
         if touch is None or not math.isfinite(state.energy):
             return None
         pressed = touch.forces.nonzero()[0] if forces.entries else ()
-        gap = max(touch.penetration, *touch.gaps.values[pressed].tolist()) if len(pressed) else touch.penetration
+        gap = max(touch.penetration, *touch.gaps.values.take(pressed).tolist()) if len(pressed) else touch.penetration
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
-        return Near(state, touch, max(state.error / allowed, gap / (_EXACT * self._reach)), seen)
+        error = max(state.error / allowed, gap / (_EXACT * self._reach))
+        return Near(state, touch, error, seen, state.residual + touch.forces.dot(touch.rows))
 
     def descend(self, here: Near) -> tuple[Near, bool]:
         """Descend to an equilibrium; it leaves unstable ones.

@@ -50,11 +50,6 @@ class Touch(NamedTuple):
     penetration: float
     """Depth of the deepest penetration, zero without one [m]."""
 
-    @property
-    def pushes(self) -> FloatArray:
-        """Load of the forces on the elastic coordinates, shape (n_springs,)."""
-        return np.asarray(self.forces @ self.rows)
-
 
 class ForceTable(NamedTuple):
     """Normal forces by candidate, to carry them from one evaluation to the next."""
@@ -66,7 +61,7 @@ class ForceTable(NamedTuple):
     def of(cls, gaps: Gaps, forces: FloatArray) -> ForceTable:
         """Take the forces on candidates, shape (m,) [N]."""
         places = forces.nonzero()[0]
-        columns = (column[places].tolist() for column in (gaps.capsules, gaps.obstacles, gaps.features, forces))
+        columns = (column.take(places).tolist() for column in (gaps.capsules, gaps.obstacles, gaps.features, forces))
         return cls(tuple(zip(*columns, strict=True)))
 
     def at(self, gaps: Gaps) -> FloatArray:
