@@ -123,6 +123,31 @@ def test_derivatives_are_differences_of_solved_robots(kind: str) -> None:
     assert back == pytest.approx(float((np.concatenate(weights, axis=1) * pushed).sum()), rel=1e-10)
 
 
+@pytest.mark.study
+def test_equilibria_of_a_compiled_robot_are_those_of_its_batch_solver() -> None:
+    """At the values that it was compiled with; others have no code. Derivatives are the same."""
+    case = CASES["tendons"]()
+    compiled = sr.compile(sr.load_model(case.robot), backend="python")
+    solver, plain = (Differentiable("equilibrium", one, case.names, **OPTIONS) for one in (compiled, case.robot))
+    random = np.random.default_rng(5)
+    inputs = [np.array(case.motors) + 1e-4 * random.normal(size=(4, 6)), np.array(case.force), solver.present]
+    batch = compiled.equilibria(*inputs[:2], gravity=sr.EARTH_GRAVITY)
+    assert batch.certified.all()
+    results = solver.solve(*inputs)
+    assert np.array_equal(results[0], batch.q_springs)
+    assert np.array_equal(results[1], batch.tip_positions)
+    weights = [random.normal(size=part.shape) for part in results]
+    shapes = [(4,), (), ()]
+    pairs = zip(
+        solver.pull(inputs, results, weights, shapes), plain.pull(inputs, plain.solve(*inputs), weights, shapes), strict=True
+    )
+    for own, other in pairs:  # the two solvers stop at residuals of 1e-10 and 1e-12 of the load
+        assert own == pytest.approx(other, rel=1e-7, abs=1e-9 * np.abs(other).max())
+    inputs[2] = 1.01 * solver.present
+    for own, other in zip(solver.solve(*inputs), plain.solve(*inputs), strict=True):
+        assert np.array_equal(own, other)
+
+
 def test_load_estimates_of_an_arm_with_a_plateau() -> None:
     """By motors, torques and parameters: differences of estimates, and the transpose."""
     solver = Differentiable("estimate", sr.InflatableArm(max_moment=12.0), ("max_moment", "link[2].stiffness"), **OPTIONS)

@@ -76,7 +76,8 @@ class Differentiable:
         if chosen != GENERAL:
             self._changes = NumberChanges(self._set, chosen, weight=gravity is not None)
         else:
-            self._changes = GeneralSolver(self._set, weight=gravity is not None)
+            compiled = robot if isinstance(robot, CompiledModel) and backend != GENERAL else None
+            self._changes = GeneralSolver(self._set, weight=gravity is not None, compiled=compiled)
             felt = int(self.model.actuators.feels.sum())
             if kind == "estimate" and felt != 3:
                 requirement = f"a robot of which three actuators feel the load ({felt} do), or a chain that is compiled"

@@ -1,8 +1,9 @@
 r"""Equilibria and load estimates of every robot without dry friction, with the derivatives of those of `sensitivity`.
 
 The counterpart of `number_changes` and compiled code, with the same calls: each row is found as by `solve_equilibrium` or
-`estimate_load`, from rest. Derivatives are the closed forms of `softrobots.identification.residual_derivatives` for many rows
-at once: in reverse one adjoint row a case, whatever the number of parameters; forwards one for each component of the results.
+`estimate_load`, from rest; equilibria of the robot that code was compiled of by its batch solver. Derivatives are the closed
+forms of `softrobots.identification.residual_derivatives` for many rows at once: in reverse one adjoint row a case, whatever the
+number of parameters; forwards one for each component of the results.
 The numbers of the robot are here its parameters themselves.
 
 A load estimate holds three felt loads `tau` at what was measured by the force `f`:
@@ -20,6 +21,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.run.responses import Cases
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
@@ -43,9 +45,9 @@ _JUMPS = 1e4  # change of a coefficient of `E` over the relative change of a par
 class GeneralSolver:
     """A robot by values of its parameters; see `number_changes.NumberChanges`."""
 
-    def __init__(self, parameters: ParameterSet, *, weight: bool) -> None:
-        """Take the parameters."""
-        self._parameters, self._weight = parameters, weight
+    def __init__(self, parameters: ParameterSet, *, weight: bool, compiled: CompiledModel | None = None) -> None:
+        """Take the parameters, and compiled solvers for the equilibria of the robot as it is."""
+        self._parameters, self._weight, self._compiled = parameters, weight, compiled
         self._at, self._change = lru_cache(maxsize=16)(self._model), lru_cache(maxsize=4)(self._model_change)
 
     def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[GeneralResponses, FloatArray, FloatArray]:
@@ -58,7 +60,10 @@ class GeneralSolver:
         size = len(values)
         change = self._change(values) if slopes else ModelChange(size, {})
         sizes = dict(zip(self._parameters.names, values, strict=True))
-        responses = GeneralResponses(self._at(values), change, sizes, self._weight)
+        model, compiled = self._at(values), self._compiled
+        responses = GeneralResponses(
+            model, change, sizes, self._weight, compiled if compiled is not None and compiled.model == model else None
+        )
         return responses, np.array(values).reshape(1, size), np.eye(size) if slopes else np.zeros((size, 0))
 
     def _model(self, values: tuple[float, ...]) -> SoftModel:
@@ -83,14 +88,25 @@ class _Slopes(NamedTuple):
 class GeneralResponses:
     """Solvers of a robot at values of its parameters; see `softrobots.compiled.run.responses.Responses`."""
 
-    def __init__(self, model: SoftModel, change: ModelChange, values: Mapping[str, float], weight: bool) -> None:
-        self._model, self._change, self._values, self._weight = model, change, values, weight
+    def __init__(
+        self,
+        model: SoftModel,
+        change: ModelChange,
+        values: Mapping[str, float],
+        weight: bool,
+        compiled: CompiledModel | None,
+    ) -> None:
+        self._model, self._change, self._values, self._weight, self._compiled = model, change, values, weight, compiled
 
     def equilibria(
         self, motors: FloatArray, force: FloatArray, gravity: FloatArray, numbers: FloatArray, threads: int, count: int
     ) -> list[Any]:
         """Find equilibria from rest."""
         model = self._model
+        if self._compiled is not None:
+            rows = (np.broadcast_to(one, (count, one.shape[1])) for one in (motors, force))
+            batch = self._compiled.equilibria(*rows, gravity=gravity if self._weight else None, threads=threads)
+            return [np.array(batch.q_springs), np.array(batch.tip_positions), np.array(batch.residual), batch.status]
         springs, tips, errors, statuses = self._room(count)
         for row, (at, push) in enumerate(_rows(count, motors, force)):
             try:
