@@ -27,7 +27,7 @@ PACKAGE = Path(sr.__file__).resolve().parent
 PICTURE = PACKAGE.parent / "docs" / "images" / "architecture.png"
 KEY = "Rooms"
 """Entry of the PNG file that says as JSON what is drawn."""
-WIDTH, HEIGHT, GAP, RISE, LANE = 3.3, 1.8, 0.4, 2.5, 0.35
+WIDTH, HEIGHT, GAP, RISE, LANE = 3.3, 2.2, 0.4, 2.9, 0.35
 """Width and height of a box, gap between boxes, distance of layers, width of an arrow that passes a layer [inch]."""
 TOLERANCE = 0.2
 """Share by which the lines of a room may differ from the picture."""
@@ -173,10 +173,10 @@ def draw(rooms: dict[str, Room]) -> Any:
         corner = (x - WIDTH / 2, y - HEIGHT / 2)
         box = FancyBboxPatch(corner, WIDTH, HEIGHT, boxstyle="round,pad=0,rounding_size=0.08", fc="#eef3f8", ec="0.25", lw=1.2)
         axes.add_patch(box)
-        axes.text(x, y + 0.66, name, ha="center", va="center", fontsize=17, weight="bold")
-        axes.text(x, y + 0.0, textwrap.fill(room.purpose, 34), ha="center", va="center", fontsize=12, linespacing=1.2)
+        axes.text(x, y + 0.84, name, ha="center", va="center", fontsize=17, weight="bold")
+        axes.text(x, y + 0.0, textwrap.fill(room.purpose, 28), ha="center", va="center", fontsize=14.5, linespacing=1.2)
         size = f"{room.modules} modules, {room.lines} lines"
-        axes.text(x, y - 0.7, size, ha="center", va="center", fontsize=12, color="0.35")
+        axes.text(x, y - 0.88, size, ha="center", va="center", fontsize=14.5, color="0.35")
     return figure
 
 

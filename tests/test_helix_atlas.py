@@ -18,6 +18,7 @@ from softrobots.core.errors import ParameterError, StraightTube
 from softrobots.view.figures import helices
 from softrobots.view.figures.helix_sheet import draw
 from tests.conftest import missing
+from tests.support.figures import READABLE, smallest_text
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
@@ -266,6 +267,8 @@ def test_captions_tell_the_shape() -> None:
     assert caption.startswith("$R_o$ = 8.54 cm\n$b$ = 2.8 cm/rad\n")  # docs/theory.md 3: 0.0854078008, 0.0279647090 m
     turns = 1.0 / (math.cos(math.radians(5.0)) * 2 * math.pi * math.hypot(0.0854078008, 0.0279647090))
     assert caption.endswith(f"{turns:.2f} turns")
+    assert smallest_text(figure) >= READABLE
+    assert smallest_text(helices.grid([0.9, 0.7, 0.5, 0.38, 0.36], ANGLES, D, 1.0)) >= READABLE
 
 
 def test_radius_and_pitch_run_from_start_to_end_and_change_style_at_contact() -> None:

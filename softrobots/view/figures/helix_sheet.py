@@ -29,7 +29,7 @@ _COARSEST = 0.3  # turn from ring to ring: a side of the tube [rad]
 _ELEVATION = math.radians(25.0)
 _TO_LIGHT = np.array([-0.40, -0.62, 0.68])
 _PAGE = (9.0, 8.4)  # inches that rows and columns of helices share
-_CAPTION = (1.5, 0.8)  # width and height of a caption, inches
+_CAPTION = (1.5, 0.95)  # width and height of a caption, inches
 _NARROWEST = 8.2  # width of title and key, inches
 
 
@@ -107,7 +107,7 @@ def draw(share: float, tilt: float, diameter: float, length: float, handedness: 
     order = np.argsort(-far[seen])
     flat = np.stack([at[..., 0], at[..., 1] * sine + at[..., 2] * cosine], axis=-1)
     caption = f"$R_o$ = {100 * float(shape.outer_radius):.3g} cm\n$b$ = {100 * float(shape.pitch):.3g} cm/rad\n"
-    caption += f"{turns:.2f} turns" + (", in contact" if touches else "")
+    caption += f"{turns:.2f} turns" + ("\nin contact" if touches else "")
     return DrawnTube(flat[seen][order], colours[seen][order], caption, touches)
 
 
@@ -137,6 +137,7 @@ def sheet(drawn: list[list[DrawnTube]], shares: FloatArray, tilts: FloatArray, t
     across, up = np.maximum(scale * widths + 0.4, _CAPTION[0]), scale * heights + _CAPTION[1]
     margin = max(0.0, 0.5 * (_NARROWEST - 0.9 - float(np.sum(across))))
     size = (0.9 + 2.0 * margin + float(np.sum(across)), 1.6 + float(np.sum(up)))
+    small = min(12.0, 1.265 * size[0])  # seven pixels on a picture 400 pixels wide, and not wider than the column of a caption
     figure = new_figure(size)
     figure.set_layout_engine("none")
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
@@ -144,17 +145,17 @@ def sheet(drawn: list[list[DrawnTube]], shares: FloatArray, tilts: FloatArray, t
     axes.set_axis_off()
     middles = 0.8 + margin + np.cumsum(across) - 0.5 * across
     for middle, share in zip(middles, shares, strict=True):
-        axes.text(middle, size[1] - 0.75, rf"$\lambda$ = {share:.4g}", ha="center", va="center", fontsize=11)
+        axes.text(middle, size[1] - 0.75, rf"$\lambda$ = {share:.4g}", ha="center", va="center", fontsize=max(11.0, small))
     top = size[1] - 1.0
     for row, tilt, height in zip(drawn, tilts, up, strict=True):
         at = top - 0.5 * (height - _CAPTION[1])
-        axes.text(0.15 + margin, at, rf"$\theta$ = {np.degrees(tilt):.4g}°", ha="left", va="center", fontsize=11)
+        axes.text(0.15 + margin, at, rf"$\theta$ = {np.degrees(tilt):.4g}°", ha="left", va="center", fontsize=max(11.0, small))
         for one, middle in zip(row, middles, strict=True):
             _paint(axes, one, scale, np.array([middle, at]))
-            axes.text(middle, top - height + _CAPTION[1] - 0.1, one.caption, ha="center", va="top", fontsize=8)
+            axes.text(middle, top - height + _CAPTION[1] - 0.1, one.caption, ha="center", va="top", fontsize=small)
         top -= height
     axes.text(0.5 * size[0], size[1] - 0.3, title, ha="center", va="center", fontsize=13)
-    _key(axes, scale, any(one.touches for row in drawn for one in row))
+    _key(axes, scale, small, any(one.touches for row in drawn for one in row))
     return figure
 
 
@@ -167,16 +168,16 @@ def _paint(axes: Any, one: DrawnTube, scale: float, middle: FloatArray) -> None:
     axes.add_collection(PolyCollection(list(faces), **style))
 
 
-def _key(axes: Any, scale: float, contact: bool) -> None:
+def _key(axes: Any, scale: float, small: float, contact: bool) -> None:
     """Bar of the scale and what the colours are, at the lower edge."""
     from matplotlib.patches import Patch
 
     bar = 10.0 ** math.floor(math.log10(1.8 / scale))
     bar *= next(number for number in (5, 2, 1) if number * bar * scale <= 1.8)
     axes.plot([0.4, 0.4 + scale * bar], [0.38, 0.38], color="black", lw=3.0, solid_capstyle="butt")
-    axes.text(0.4 + 0.5 * scale * bar, 0.32, f"{100 * bar:.3g} cm", ha="center", va="top", fontsize=9)
+    axes.text(0.4 + 0.5 * scale * bar, 0.32, f"{100 * bar:.3g} cm", ha="center", va="top", fontsize=small)
     colours = {"actuator, contracts": ACTUATOR, "line opposite, keeps its length": OPPOSITE}
     if contact:
         colours["in contact: the tube runs into itself"] = WALL_IN_CONTACT
     patches = [Patch(color=colour, label=text) for text, colour in colours.items()]
-    axes.legend(handles=patches, loc="lower right", ncols=2, fontsize=9, frameon=False)
+    axes.legend(handles=patches, loc="lower right", ncols=2, fontsize=small, frameon=False)
