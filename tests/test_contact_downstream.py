@@ -386,8 +386,6 @@ def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
         sr.solve_ik(found.model, (0.9, 0.3, 0.2), method="fixed_point", **options)
     with pytest.raises(sr.ParameterError, match="method"):
         sr.follow_trajectory(found.model, [(0.9, 0.3, 0.2)], method="paper", times=[0.0], **options)
-    with pytest.raises(sr.ParameterError, match="follow_contact follows given motors with it"):
-        sr.follow_trajectory(found.model, [(0.9, 0.3, 0.2)], friction=0.3, **options)
     with pytest.raises(sr.ParameterError, match="method"):
         sr.estimate_load(found.model, MOTORS, found.motor_torques, method="alternation", **options)
 

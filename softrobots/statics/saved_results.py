@@ -187,13 +187,15 @@ def _unpack_imposed(fields: Mapping[str, Any]) -> ImposedDisplacement:
 
 
 def _pack_trajectory(trajectory: Trajectory) -> dict[str, Any]:
-    rows = _pack_rows(trajectory.equilibria)
+    path = trajectory.contact_path
+    rows = _pack_rows(trajectory.equilibria) if path is None else KINDS["contact_path"].to_arrays(path)
     targets = {"targets": trajectory.targets, "orientations": trajectory.orientations}
     return rows | targets | {"times": trajectory.times, "following": trajectory.method}
 
 
 def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
-    equilibria = _unpack_rows(fields)
+    path = KINDS["contact_path"].from_arrays(fields) if "dissipation" in fields else None
+    equilibria = _unpack_rows(fields) if path is None else path.equilibria
     orientations = None
     if "orientations" in fields:
         given = finite_array("orientations", fields["orientations"], (len(equilibria), 3, 3))
@@ -204,6 +206,7 @@ def _unpack_trajectory(fields: Mapping[str, Any]) -> Trajectory:
         targets=read_only(finite_array("targets", fields["targets"], (len(equilibria), 3), "m")),
         equilibria=equilibria,
         method=label(fields, "following"),
+        contact_path=path,
     )
 
 

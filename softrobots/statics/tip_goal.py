@@ -75,12 +75,12 @@ class Goal(NamedTuple):
             raise ParameterError("targets", targets, f"{requirement}; it has shape {rows.shape}")
         return [cls.of(row) for row in rows]
 
-    def halfway(self, other: Goal) -> Goal:
-        """Return the goal in the middle: of the line between the positions, and of the turn between two orientations."""
+    def between(self, other: Goal, share: float) -> Goal:
+        """Return the goal at a share of the line between the positions, and of the turn between two orientations."""
+        position = (1.0 - share) * self.position + share * other.position
         if self.rotation is None or other.rotation is None or other.rotation.ndim == 1:
-            return other._replace(position=0.5 * (self.position + other.position))
-        turn = pin.exp3(0.5 * pin.log3(self.rotation.T @ other.rotation))
-        return Goal(0.5 * (self.position + other.position), self.rotation @ turn)
+            return other._replace(position=position)
+        return Goal(position, self.rotation @ pin.exp3(share * pin.log3(self.rotation.T @ other.rotation)))
 
     @property
     def rows(self) -> int:

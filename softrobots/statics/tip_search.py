@@ -31,9 +31,11 @@ SAME = 1e-6
 LEVER = 0.2
 """Weight of a radian of orientation as a distance, relative to the reach."""
 
+WARM_DAMPING = 1e-6
+"""Damping of the first step of a search that starts from a prediction, relative to the reach."""
+
 _FIRST_DAMPING = 0.03  # of the first step, relative to the reach
 _LAST_DAMPING = 1e-8
-_WARM_DAMPING = 1e-6  # of the first step of a search that starts from a prediction
 _HALVINGS = 6  # of the way between two waypoints
 _LARGEST_STEP = 0.5  # [rad], norm of one step over the scale of the actuators
 _STATIONARY = 1e-8  # slope of the distance [m/rad per m of reach] that counts as zero: a local minimum
@@ -250,12 +252,12 @@ def advance(
             motors = actuators.go(here.q_motors, actuators.basis @ step)
             springs = here.state.q_springs + shift + follow @ (motors - here.q_motors)
             near: dict[str, Any] = {"home": here.q_motors, "farthest": _JUMP}
-            found = search(there, motors, springs, tolerance=tolerance, damping=_WARM_DAMPING, **near)
+            found = search(there, motors, springs, tolerance=tolerance, damping=WARM_DAMPING, **near)
             if found is not None and found.arrived(tolerance) and _apart(tip.model, found.q_motors, here.q_motors) <= _JUMP:
                 return found
     if halvings == 0:
         return None
-    middle = last.halfway(target)
+    middle = last.between(target, 0.5)
     half = advance(tip, last, middle, here, tolerance, halvings - 1)
     return None if half is None else advance(tip, middle, target, half, tolerance, halvings - 1)
 

@@ -10,19 +10,30 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_array, increasing, positive_number, read_only, read_only_mapping
+from softrobots.core.checks import (
+    FloatArray,
+    choice,
+    finite_array,
+    increasing,
+    non_negative_number,
+    positive_number,
+    read_only,
+    read_only_mapping,
+)
 from softrobots.core.errors import ParameterError, TargetUnreachable
 from softrobots.core.progress import with_progress
 from softrobots.core.summary import Part, Summarised
 from softrobots.environment.environment import Environment
-from softrobots.model.friction_coordinates import untouched
+from softrobots.model.friction_coordinates import check_frictionless, untouched
 from softrobots.model.link_limits import known_margins
 from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.statics.contact.contact_path import ContactPath
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_goal import Goal, LoadedTip
 from softrobots.statics.tip_path.closed_loop import paper_steps
+from softrobots.statics.tip_path.contact_steps import follow_targets
 from softrobots.statics.tip_path.waypoints import exact_steps, named
 from softrobots.statics.tip_search import POSITION_TOLERANCE
 from softrobots.statics.trajectory_summary import trajectory_parts
@@ -46,6 +57,8 @@ class Trajectory(Summarised):
     """Method of `follow_trajectory`, or a label of the caller for a trajectory from elsewhere."""
     orientations: FloatArray | None = None
     """Target orientations of the tip, shape (n, 3, 3); None: any."""
+    contact_path: ContactPath | None = None
+    """With friction: its work, and what happened to the contacts, with times for parameters; None without."""
 
     @property
     def model(self) -> SoftModel:
@@ -167,6 +180,11 @@ def follow_trajectory(
     by the fixed point at every step: it follows with a lag that depends on the gain. (With the 6 x 7 Jacobian that the paper
     prints it diverges at useful gains: three motors cannot hold an orientation.) It starts exactly on the first target.
 
+    With friction the target goes straight from waypoint to waypoint in the quasi-static steps of `follow_contact`, and the
+    motors are those with which a step ends at its target. At the first one contacts have no friction yet; from there on each
+    sticks or slips, so that the answer depends on the way. A tip on an obstacle may press on it more or less: motors change
+    least in a step, as without friction.
+
     Args:
         model: The robot, with at least one motor.
         targets: Target positions, shape (n, 3) [m], world axes; or poses of the tip, shape (n, 4, 4) or a sequence of
@@ -183,9 +201,9 @@ def follow_trajectory(
         times: Increasing times of the waypoints, shape (n,) [s]; required by "paper".
         gain: Gain `K` of "paper" [1/s]; intervals longer than half its inverse are integrated in several steps.
         allow_jumps: Where a waypoint cannot be reached from the last one by a continuous motion (a motor limit, a turn of the
-            base under a tip that passes over it), go on from the nearest other solution instead of raising.
-        environment: Obstacles that the robot may lean on without friction, only with "newton"; None: free space.
-        friction: Must be 0, no friction at contacts; `follow_contact` follows motors with it.
+            base under a tip that passes over it), go on from the nearest other solution instead of raising; not with friction.
+        environment: Obstacles that the robot may lean on, only with "newton"; None: free space.
+        friction: Friction coefficient of all contacts [-], for robots whose muscles can push.
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
@@ -201,11 +219,13 @@ def follow_trajectory(
         EquilibriumNotFound: If a waypoint has no equilibrium.
     """
     choice("method", method, METHODS if environment is None else METHODS[:1])
-    if friction != 0.0:
-        raise ParameterError(
-            "friction", friction, "0: motors for a tip are sought without friction; follow_contact follows given motors with it"
-        )
     model = untouched(check_model(model))
+    rubs = non_negative_number("friction", friction) > 0.0
+    if rubs and (environment is None or allow_jumps or model.actuators.least_tension):
+        requirement = "0 without an environment, with allow_jumps=True, and for a robot whose muscles cannot push"
+        raise ParameterError("friction", friction, requirement)
+    if rubs:
+        check_frictionless(model, "friction at contacts")
     goals = Goal.path(targets)
     points = np.array([goal.position for goal in goals])
     orientations = None if goals[0].rotation is None else read_only(np.array([goal.rotation for goal in goals]))
@@ -233,6 +253,9 @@ def follow_trajectory(
         raise named(error, 1, len(points)) from error
 
     def follow_from(first: Equilibrium) -> Trajectory:
+        if rubs:
+            path = follow_targets(model, goals, moments, load, first, friction, tolerance=tolerance, progress=progress)
+            return Trajectory(read_only(moments), read_only(points), path.equilibria, method, orientations, path)
         steps = (
             paper_steps(model, points, moments, load, first, gain)
             if method == "paper"

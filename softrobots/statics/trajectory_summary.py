@@ -34,6 +34,8 @@ def trajectory_parts(trajectory: Any) -> list[Part]:
     for name, force in trajectory.contact_forces.items():
         worst = int(np.argmax(force))
         summary.append((f"force on {name}", f"up to {formatted(force[worst])} N, at waypoint {worst + 1}"))
+    if trajectory.contact_path is not None:
+        summary.append(("work of friction", f"{formatted(trajectory.contact_path.dissipation[-1])} J"))
     if trajectory.link_moments is not None:
         largest = trajectory.link_moments.max(axis=0)
         margin, slack = (trajectory.least_margin(name) for name in ("wrinkling_margins", "slack_margins"))

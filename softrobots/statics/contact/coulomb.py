@@ -17,11 +17,13 @@ and sliding that no motion of the springs can prevent (an elbow of rigid links t
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.statics.contact.contact_laws import Balance, Laws, NearContacts, Step
+from softrobots.statics.contact.newton_in_contact import newton_change
 
 MOST_EVALUATIONS = 40
 """Evaluations within a step of a path."""
@@ -43,91 +45,6 @@ FORCED = 1e-4
 """Largest sliding in a step of a contact that sticks, relative to the reach, where no motion of the springs can prevent it."""
 
 _STILL = 1e-10  # [rad], Newton step after which no motion of the springs brings the equations any nearer
-_FIRST = 1e4  # weight of gaps over sliding, where both cannot be zero
-_RANK = 1e-12  # singular values below this, relative to the largest, are none
-
-
-class NearContacts(NamedTuple):
-    """Contacts that may press, at given elastic coordinates; `m` of them."""
-
-    gaps: FloatArray
-    """Gaps, shape (m,) [m]."""
-    gradients: FloatArray
-    """Derivative of the gaps, shape (m, n) [m/rad]."""
-    sliding: FloatArray
-    """Sliding since the last state along two unit vectors of each tangent plane, shape (m, 2) [m]."""
-    jacobian: FloatArray
-    """Motion of the touching points along them, shape (m, 2, n) [m/rad]."""
-
-
-class Balance(NamedTuple):
-    """Elastic coordinates and forces of contacts of a step, in equilibrium or not."""
-
-    q_springs: FloatArray
-    """Elastic coordinates, shape (n,) [rad or m]."""
-    contacts: NearContacts
-    """The contacts there."""
-    normal: FloatArray
-    """Normal forces, shape (m,) [N]."""
-    friction: FloatArray
-    """Friction along the vectors of `NearContacts.sliding`, shape (m, 2) [N]."""
-    residual: FloatArray
-    """Torque out of balance, shape (n,) [N m or N]."""
-    tangent: FloatArray
-    """Derivative of the residual at the forces given, shape (n, n)."""
-    allowed: float
-    """Residual that counts as none [N m]."""
-    laws: Laws
-    """What each contact does."""
-
-
-class Laws(NamedTuple):
-    """What each contact does at an iterate, in units in which springs and contacts have stiffness 1."""
-
-    pressed: Any
-    """Which contacts press, shape (m,), bool."""
-    sticks: Any
-    """Which of them stick, shape (m,), bool."""
-    slips: Any
-    """Which of them slip, shape (m,), bool."""
-    way: FloatArray
-    """Direction of the friction that was tried, shape (m, 2)."""
-    held: FloatArray
-    """Largest friction over the one tried, shape (m,)."""
-    broken: FloatArray
-    """Friction less that of its law, shape (m, 2) [N]."""
-    root: FloatArray
-    """Square root of the scale of stiffness of each spring, shape (n,)."""
-    unit_normal: FloatArray
-    """Unit of normal forces, shape (m,)."""
-    unit_friction: FloatArray
-    """Unit of friction, shape (m,)."""
-    merit: float
-    """Norm of all equations in these units."""
-
-
-class Step(Protocol):
-    """A robot in a step of a path."""
-
-    stiffness: FloatArray
-    """Stiffness of the springs, a scale, shape (n,) [N m/rad or N/m]."""
-    reach: float
-    """Length of the robot, a scale [m]."""
-
-    def contacts(self, q_springs: FloatArray) -> NearContacts | None:
-        """Return the near contacts; None out of the range of a section."""
-
-    def mark(self) -> Any:
-        """Return a mark of the place asked last."""
-
-    def return_to(self, mark: Any) -> None:
-        """Return to the place of a mark, as if it had been asked last."""
-
-    def carried(self, normal: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Return the forces that these contacts had at the place asked before, shapes (m,) and (m, 2) [N]."""
-
-    def residual(self, normal: FloatArray, friction: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """Return torque out of balance, its derivative and the torque that counts as none at the last place asked."""
 
 
 def solve_step(step: Step, start: FloatArray, coefficient: float) -> tuple[Balance | None, int]:
@@ -152,7 +69,7 @@ def solve_step(step: Step, start: FloatArray, coefficient: float) -> tuple[Balan
         while here is not None and spent < first + most:
             if _converged(step, here):
                 return here, spent
-            change = _newton_change(here, coefficient)
+            change = newton_change(here, coefficient)
             if change is None:
                 break
             if float(np.linalg.norm(change[0])) <= _STILL and _converged(step, here, FORCED):
@@ -246,43 +163,3 @@ def _converged(step: Step, here: Balance, sliding: float = GAP) -> bool:
 def _unit_force(rows: FloatArray, root: FloatArray, reach: float) -> FloatArray:
     """Force along each row that stores half a joule in the springs alone, shape of the rows without their last axis [N]."""
     return np.asarray(1.0 / np.maximum(np.linalg.norm(rows / root, axis=-1), _MOTIONLESS * reach / root.max()))
-
-
-def _newton_change(here: Balance, coefficient: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
-    """Newton step of coordinates, normal forces and friction."""
-    near, laws, n, root = here.contacts, here.laws, len(here.q_springs), here.laws.root
-    by_normal, by_friction = -here.normal, -here.friction  # those that do not press lose their forces
-    pressed, rubs = np.flatnonzero(laws.pressed), np.flatnonzero(laws.slips | laws.sticks)
-    by_normal[pressed], by_friction[rubs] = 0.0, 0.0
-    lost = by_normal @ near.gradients + np.tensordot(by_friction, near.jacobian)
-    place = n + np.arange(len(pressed))
-    places = n + len(pressed) + np.arange(2 * len(rubs)).reshape(-1, 2)
-    gradients = near.gradients[pressed] / root * laws.unit_normal[pressed, None]
-    jacobian = near.jacobian[rubs] / root * laws.unit_friction[rubs, None, None]
-    matrix = np.zeros((n + len(pressed) + 2 * len(rubs),) * 2)
-    right = np.zeros(len(matrix))
-    matrix[:n, :n], right[:n] = here.tangent / root / root[:, None], (lost - here.residual) / root
-    matrix[:n, place], matrix[place, :n] = -gradients.T, gradients
-    right[place] = -near.gaps[pressed] * laws.unit_normal[pressed]
-    matrix[:n, places.ravel()] = -jacobian.reshape(-1, n).T
-    for one, rows, moves in zip(rubs.tolist(), places, jacobian, strict=True):
-        if laws.sticks[one]:
-            matrix[rows, :n] = moves
-            right[rows] = -near.sliding[one] * laws.unit_friction[one]
-            continue
-        # d lambda_t = mu way d lambda_n + held (1 - way way^T) (d lambda_t - rho d s)
-        way, ratio = laws.way[one], laws.unit_normal[one] / laws.unit_friction[one]
-        turn = laws.held[one] * (np.eye(2) - np.outer(way, way))
-        matrix[np.ix_(rows, rows)] = np.eye(2) - turn
-        matrix[rows, :n] = turn @ moves
-        matrix[rows, place[np.searchsorted(pressed, one)]] = -coefficient * ratio * way
-        right[rows] = -laws.broken[one] / laws.unit_friction[one]
-    matrix[place] *= _FIRST
-    right[place] *= _FIRST
-    try:
-        change = np.linalg.lstsq(matrix, right, rcond=_RANK)[0]
-    except np.linalg.LinAlgError:
-        return None
-    by_normal[pressed] = change[place] * laws.unit_normal[pressed]
-    by_friction[rubs] = change[places] * laws.unit_friction[rubs, None]
-    return change[:n] / root, by_normal, by_friction

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -15,18 +15,13 @@ from softrobots.environment.environment import check_environment
 from softrobots.environment.gaps import Surroundings
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.contact.contact_path import LOST, MADE, ContactEvent, ContactJump, ContactPath
-from softrobots.statics.contact.last_state import MARGIN, Given, Sliding, forces_of
-from softrobots.statics.contact.quasi_static import Rest, carried_over, change, energy_drop, move_to_rest, settle, step
+from softrobots.statics.contact.contact_path import ContactJump, ContactPath
+from softrobots.statics.contact.contact_walk import ContactWalk
+from softrobots.statics.contact.last_state import Given
+from softrobots.statics.contact.quasi_static import Rest, at_rest, carried_over, change, energy_drop, move_to_rest, step
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.statics.equilibrium_result import Equilibrium, check_same_model
 from softrobots.statics.loads import Load
-
-SMALLEST = 2.0**-14
-"""Smallest step, a share of the way from one parameter to the next."""
-
-EVENT = 2.0**-7
-"""Largest step in which a contact is made or lost or begins to slip or stick, likewise."""
 
 _JUMP = 1e-2  # way of the springs beyond which overdamped motion is a jump [rad]
 
@@ -82,11 +77,12 @@ def follow_contact(
     """
     course = Course(model, q_motors, {"force": force, "wrench": wrench, "gravity": gravity}, frame, environment, parameters)
     coefficient = non_negative_number("friction", friction)
-    walk, ended = _Walk(course, allow_jumps), ""
+    driven = _Driven(course.at, course.parameter, allow_jumps)
+    walk, ended = ContactWalk(driven), ""
     rows: list[Equilibrium] = []
     worked: list[float] = []
     steps = with_progress(
-        walk.rows(_first(course, coefficient, start)),
+        walk.rows(_first(course, coefficient, start), len(course.parameters)),
         progress,
         label="steps in contact",
         unit="step",
@@ -100,8 +96,8 @@ def follow_contact(
             friction=coefficient,
             dissipation=read_only(np.array(worked)),
             events=tuple(walk.events),
-            jumps=tuple(walk.jumps),
-            ended=ended or walk.ended,
+            jumps=tuple(driven.jumps),
+            ended=ended or driven.ended,
         )
 
     try:
@@ -172,52 +168,25 @@ class Course:
         return Given(model, motors, replace(load, environment=environment), environment, self._last[2])
 
 
-class _Walk:
-    """Steps along a course, with what happens on the way."""
+class _Driven:
+    """A robot that is driven from place to place, and snaps where it cannot follow; a `contact_walk.Way`."""
 
-    def __init__(self, course: Course, allow_jumps: bool) -> None:
-        self._course, self._allow_jumps, self._share = course, allow_jumps, 0.25
-        self.events: list[ContactEvent] = []
+    def __init__(self, given_at: Callable[[float], Given], parameter: Callable[[float], float], allow_jumps: bool) -> None:
+        self._given_at, self.parameter, self._allow_jumps = given_at, parameter, allow_jumps
         self.jumps: list[ContactJump] = []
-        self.work = 0.0
-        """Work against friction so far [J]."""
         self.ended = ""
 
-    def rows(self, first: Rest) -> Iterator[Rest]:
-        """Go from row to row; ends before a jump that is not allowed."""
-        here: Rest | None = first
-        yield first
-        for row in range(1, len(self._course.parameters)):
-            here = self.go(self._course.at, here, row - 1)  # type: ignore[arg-type]
-            if here is None:
-                return
-            yield here
+    def step(self, place: float, here: Rest) -> Rest | None:
+        """Go to a place; None if there is no equilibrium that holds near the last one."""
+        return step(self._given_at(place), here)
 
-    def go(self, given_at: Callable[[float], Given], here: Rest, place: float) -> Rest | None:
-        """Go from one place to the next whole number; None before a jump that is not allowed."""
-        end = place + 1.0
-        while place < end:
-            aim = min(place + self._share, end)
-            given = given_at(aim)
-            there = step(given, here)
-            if there is None and aim - place <= SMALLEST:
-                there = self._jumped(given, here, self._course.parameter(aim))
-                if there is None:
-                    return None
-            elif there is None or (aim - place > EVENT and there.statuses != here.statuses):
-                self._share = max(0.5 * (aim - place), SMALLEST)
-                continue
-            self._tell(here.statuses, there.statuses, self._course.parameter(aim))
-            self.work += there.work
-            here, place, self._share = there, aim, min(2.0 * self._share, 1.0)
-        return here
-
-    def _jumped(self, given: Given, here: Rest, parameter: float) -> Rest | None:
+    def blocked(self, place: float, here: Rest) -> Rest | None:
         """Where a robot comes to rest that has no equilibrium near; None if jumps are not allowed.
 
         Raises:
             EquilibriumNotFound: If it does not come to rest.
         """
+        given, parameter = self._given_at(place), self.parameter(place)
         if not self._allow_jumps:
             self.ended = f"at parameter {parameter:.6g} the robot leaves its equilibrium (allow_jumps=True follows it)"
             return None
@@ -234,13 +203,6 @@ class _Walk:
             self.jumps.append(ContactJump(parameter, here.equilibrium(), rest.equilibrium(), lost))
         return rest
 
-    def _tell(self, before: dict[tuple[str, str], str], after: dict[tuple[str, str], str], parameter: float) -> None:
-        """Note which contacts have changed."""
-        for pair in before.keys() | after.keys():
-            kind = MADE if pair not in before else after.get(pair, LOST)
-            if kind != before.get(pair):
-                self.events.append(ContactEvent(parameter, kind, *pair))
-
 
 def _first(course: Course, friction: float, start: Equilibrium | None) -> Rest:
     """The robot at rest at the first row.
@@ -255,11 +217,10 @@ def _first(course: Course, friction: float, start: Equilibrium | None) -> Rest:
     else:
         check_same_model(given.model, start, "start")
         here = start
-    last = Sliding(friction, given.surroundings.at(here.q, MARGIN * given.model.reach))
-    last = replace(last, forces=forces_of(last.gaps, here.contacts))
-    rest = settle(unloaded if start is None else given, last, here.q_springs)
+    rest = at_rest(unloaded if start is None else given, here, friction)
     if rest is not None and start is None:
-        rest = _Walk(course, True).go(lambda share: given._replace(load=given.load.scaled(share)), rest, 0.0)
+        loading = _Driven(lambda share: given._replace(load=given.load.scaled(share)), lambda _: course.parameter(0.0), True)
+        rest = ContactWalk(loading).go(rest, 0.0)
     if rest is None:
         raise EquilibriumNotFound(
             "there is no equilibrium that holds at the first parameter", best=here, residual=here.residual, iterations=0

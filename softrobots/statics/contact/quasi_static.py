@@ -19,8 +19,9 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.environment.gaps import Surroundings
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.contact.coulomb import Balance, solve_step
-from softrobots.statics.contact.last_state import MARGIN, Given, Sliding
+from softrobots.statics.contact.contact_laws import Balance
+from softrobots.statics.contact.coulomb import solve_step
+from softrobots.statics.contact.last_state import MARGIN, Given, Sliding, forces_of
 from softrobots.statics.contact.sliding import SlidingRobot
 from softrobots.statics.equilibrium_result import Equilibrium
 
@@ -47,6 +48,11 @@ class Rest(NamedTuple):
     """Work against friction in the step [J]."""
     iterations: int
     """Evaluations."""
+
+    @property
+    def q_motors(self) -> FloatArray:
+        """Motor coordinates, shape (n_motors,)."""
+        return self.robot.given.q_motors
 
     @property
     def q_springs(self) -> FloatArray:
@@ -77,6 +83,12 @@ def settle(given: Given, last: Sliding, start: FloatArray, brake: float = 0.0) -
         if found is None or not robot.holds(found):
             return None
         return Rest(robot, found, robot.work(found), spent)
+
+
+def at_rest(given: Given, start: Equilibrium, friction: float) -> Rest | None:
+    """Return an equilibrium, whose contacts keep their forces, as the rest from which friction counts; None if it is none."""
+    gaps = given.surroundings.at(start.q, MARGIN * given.model.reach)
+    return settle(given, Sliding(friction, gaps, forces_of(gaps, start.contacts)), start.q_springs)
 
 
 def step(given: Given, last: Rest) -> Rest | None:

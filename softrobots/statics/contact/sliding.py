@@ -21,8 +21,9 @@ from softrobots.model.joint_loads import JointLoad
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.contact.contact import PRESSED, SLIPS, STICKS, TOUCHING, Contact, contact_at
-from softrobots.statics.contact.coulomb import Balance, NearContacts
+from softrobots.statics.contact.contact_laws import Balance, NearContacts
 from softrobots.statics.contact.last_state import MARGIN, Given, Sliding, forces_by_key, world
+from softrobots.statics.contact.newton_in_contact import ByMotors
 from softrobots.statics.contact.touch import joined
 from softrobots.statics.elastic_state import TOLERANCE, largest_residual
 from softrobots.statics.equilibrium_result import Equilibrium
@@ -44,7 +45,7 @@ class _Place:
 
 
 class SlidingRobot:
-    """A robot at given motors and load in a step from a last state; a `coulomb.Step`."""
+    """A robot at given motors and load in a step from a last state; a `contact_laws.Step`."""
 
     def __init__(self, given: Given, last: Sliding, brake: float = 0.0) -> None:
         """Take what is given in the step.
@@ -143,6 +144,14 @@ class SlidingRobot:
             more += self._turning(place.gaps, forces)
         gravity = load.gravity_derivative
         return load._replace(gravity_derivative=more if gravity is None else gravity + more)
+
+    def by_motors(self, found: Balance) -> ByMotors:
+        """Return the derivatives of load, gaps and sliding by the actuators at the coordinates asked last."""
+        place = self.at
+        moves = place.tangents @ place.gaps.point_jacobian(np.arange(len(place.gaps)), place.gaps.points)
+        columns = place.point.columns(moves.reshape(-1, moves.shape[2]))[0].reshape(len(place.gaps), 2, self.model.n_motors)
+        load = self.joint_load(found.normal, found.friction)
+        return ByMotors(place.point.reduce(load).coupling, place.point.columns(place.gaps.jacobian)[0], columns)
 
     def _turning(self, gaps: Gaps, forces: FloatArray) -> FloatArray:
         """Derivative of the torque of friction, shape (m, 3) [N], as it turns with the normal and moves over the surface.

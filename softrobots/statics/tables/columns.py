@@ -102,4 +102,5 @@ def trajectory_table(trajectory: Trajectory) -> Columns:
             name = f"joint_{name}"
         columns[name] = column
     forces = {f"force on {name} [N]": force for name, force in trajectory.contact_forces.items()}
-    return columns | last | forces
+    path = trajectory.contact_path
+    return columns | last | forces | ({} if path is None else {"work of friction [J]": path.dissipation})

@@ -1,0 +1,74 @@
+"""Quasi-static steps from place to place, halved where they do not converge and where contacts change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Protocol
+
+from softrobots.statics.contact.contact_path import LOST, MADE, ContactEvent
+from softrobots.statics.contact.quasi_static import Rest
+
+SMALLEST = 2.0**-14
+"""Smallest step, a share of the way from one place to the next."""
+
+EVENT = 2.0**-7
+"""Largest step in which a contact is made or lost or begins to slip or stick, likewise."""
+
+
+class Way(Protocol):
+    """What a robot follows: places 0, 1, 2, ... and all between two."""
+
+    def parameter(self, place: float) -> float:
+        """Parameter at a place."""
+
+    def step(self, place: float, here: Rest) -> Rest | None:
+        """Go to a place; None if there is no equilibrium that holds near the last one."""
+
+    def blocked(self, place: float, here: Rest) -> Rest | None:
+        """Go to a place that the smallest step does not reach; None: the way ends."""
+
+
+class ContactWalk:
+    """Steps along a way, with what happens to the contacts."""
+
+    def __init__(self, way: Way) -> None:
+        """Take the way."""
+        self._way, self._share = way, 0.25
+        self.events: list[ContactEvent] = []
+        self.work = 0.0
+        """Work against friction so far [J]."""
+
+    def rows(self, first: Rest, count: int) -> Iterator[Rest]:
+        """Go from the first of `count` places to the last; ends early where the way ends."""
+        here: Rest | None = first
+        yield first
+        for row in range(1, count):
+            here = self.go(here, row - 1)  # type: ignore[arg-type]
+            if here is None:
+                return
+            yield here
+
+    def go(self, here: Rest, place: float) -> Rest | None:
+        """Go from one place to the next whole number; None where the way ends."""
+        end = place + 1.0
+        while place < end:
+            aim = min(place + self._share, end)
+            there = self._way.step(aim, here)
+            if there is None and aim - place <= SMALLEST:
+                there = self._way.blocked(aim, here)
+                if there is None:
+                    return None
+            elif there is None or (aim - place > EVENT and there.statuses != here.statuses):
+                self._share = max(0.5 * (aim - place), SMALLEST)
+                continue
+            self._tell(here.statuses, there.statuses, self._way.parameter(aim))
+            self.work += there.work
+            here, place, self._share = there, aim, min(2.0 * self._share, 1.0)
+        return here
+
+    def _tell(self, before: dict[tuple[str, str], str], after: dict[tuple[str, str], str], parameter: float) -> None:
+        """Note which contacts have changed."""
+        for pair in before.keys() | after.keys():
+            kind = MADE if pair not in before else after.get(pair, LOST)
+            if kind != before.get(pair):
+                self.events.append(ContactEvent(parameter, kind, *pair))

@@ -1,0 +1,128 @@
+"""Motors for a tip that moves in contact with friction, against balances by hand and the robot that they drive."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import softrobots as sr
+from tests.support.laws import law
+from tests.support.planar_robots import block
+
+FLOOR = sr.Environment([sr.HalfSpace((0, 0, 1))])
+WALL = sr.Environment([sr.HalfSpace((-1, 0, 0), offset=-1.0, name="wall")])
+WEIGHT = np.array([0.0, 0.0, -20.0])
+
+
+@law("follow_trajectory")
+@settings(max_examples=6)
+@given(
+    stiffness=st.floats(20.0, 500.0),
+    friction=st.floats(0.05, 1.5),
+    weight=st.floats(0.5, 30.0),
+    places=st.lists(st.floats(-0.2, 0.2), min_size=2, max_size=4),
+)
+def test_a_dragged_block_is_pulled_by_a_spring_and_a_slider(
+    stiffness: float, friction: float, weight: float, places: list[float]
+) -> None:
+    """The spring carries mu N against the way of the block, which takes mu N times the way."""
+    way = np.array([0.0, *places])
+    height = 0.1
+    path = sr.follow_trajectory(
+        block(stiffness),
+        np.column_stack([way, np.zeros_like(way), np.full_like(way, height)]),
+        (0.0, 0.0, -weight),
+        environment=FLOOR,
+        friction=friction,
+        tolerance=1e-12,
+    )
+    moves = np.diff(way)
+    stretched = 0.0
+    for at, moved, motors in zip(way[1:], moves, path.q_motors[1:, 0], strict=True):
+        stretched = np.sign(moved) * friction * weight / stiffness if abs(moved) > 1e-9 else stretched
+        assert motors == pytest.approx(at + stretched, abs=1e-8)
+    assert path.contact_path is not None
+    assert path.contact_path.dissipation[1:] == pytest.approx(friction * weight * np.cumsum(np.abs(moves)), abs=1e-8)
+
+
+@pytest.fixture(scope="module")
+def start(arm: sr.SoftModel) -> sr.Equilibrium:
+    """The arm that leans on a wall."""
+    return sr.solve_equilibrium(arm, (0, 0.9, -0.4), WEIGHT, environment=WALL)
+
+
+def along_the_wall(start: sr.Equilibrium, heights: np.ndarray, friction: float) -> sr.Trajectory:
+    """The tip slides up and down the wall."""
+    targets = start.tip_position + heights[:, None] * (0.0, 0.0, 1.0)
+    return sr.follow_trajectory(start.model, targets, WEIGHT, environment=WALL, friction=friction, q_motors0=start.q_motors)
+
+
+def test_an_arm_is_dragged_down_and_up_a_wall(start: sr.Equilibrium, tmp_path: Path) -> None:
+    """Work of load and motors becomes elastic energy and work of friction; the motors drive the robot along the same way."""
+    heights = np.concatenate([np.linspace(0.0, 0.02, 5), np.linspace(0.02, 0.0, 5)[1:]])
+    path = along_the_wall(start, heights, 0.1)
+    assert path.tip_error.max() < 1e-9
+    for found, way in zip(path.equilibria[1:], np.diff(heights), strict=True):
+        (contact,) = found.contacts
+        assert contact.status == "slips"
+        assert contact.force[2] == pytest.approx(-0.1 * np.sign(way) * contact.normal_force, rel=1e-9)
+        assert found.stable
+        assert found.converged
+    driven = sr.follow_contact(start.model, path.q_motors, WEIGHT, environment=WALL, friction=0.1, start=path.equilibria[0])
+    assert driven.tip_positions == pytest.approx(path.tip_positions, abs=1e-9)  # in a plane it does not depend on the steps
+    worked = path.contact_path
+    assert worked is not None
+    middle = len(heights) // 2  # from the first slip to the top, and from the slip back to the end: no change of direction
+
+    def energy(found: sr.Equilibrium) -> float:
+        return float(0.5 * found.q_springs @ (found.model.stiffness * found.q_springs) - WEIGHT @ found.tip_position)
+
+    for first, last in ((1, middle), (middle + 1, len(heights) - 1)):
+        torques, turns = path.motor_torques[first : last + 1], np.diff(path.q_motors[first : last + 1], axis=0)
+        work = -float(np.sum(0.5 * (torques[1:] + torques[:-1]) * turns))
+        stored = energy(path.equilibria[last]) - energy(path.equilibria[first])
+        # the rule of the trapezoid between rows: a third of a step of 5 mm squared over the arm's length, and its curvature
+        assert work == pytest.approx(stored + worked.dissipation[last] - worked.dissipation[first], rel=1e-3)
+    sr.save_result(path, tmp_path / "dragged.npz")
+    again = sr.load_result(tmp_path / "dragged.npz")
+    assert isinstance(again, sr.Trajectory)
+    assert again.contact_path is not None
+    assert np.array_equal(again.q_motors, path.q_motors)
+    assert np.array_equal(again.contact_path.dissipation, worked.dissipation)
+    assert again.contact_path.events == worked.events
+    assert [one.status for one in again.contact_path.contacts[-1]] == ["slips"]
+    assert "work of friction" in str(again)
+
+
+def test_little_friction_is_nearly_none(start: sr.Equilibrium) -> None:
+    """With friction of 1e-9 the motors are those of the path without; beside it a row of steps drifts by their length."""
+    targets = np.linspace(0.0, 0.01, 9)
+    smooth, rough = (along_the_wall(start, targets, friction) for friction in (0.0, 1e-9))
+    coarse = along_the_wall(start, targets[::4], 0.0)
+    steps = np.abs(coarse.q_motors[-1] - smooth.q_motors[-1]).max()
+    assert rough.q_motors[-1] == pytest.approx(smooth.q_motors[-1], abs=max(steps, 1e-6))
+    assert rough.contact_path is not None
+    assert rough.contact_path.dissipation[-1] < 1e-8
+
+
+def test_what_sticks_is_a_pin(arm: sr.SoftModel) -> None:
+    """With a friction coefficient of 50 a link that lies on a ball does not slide on it while the tip is lifted by 1 mm."""
+    ball = sr.Environment([sr.Sphere(0.1, (0.4936, 0.0, -0.024))])
+    held = sr.solve_equilibrium(arm, (0, 0.3, -0.6), WEIGHT, environment=ball)
+    targets = held.tip_position + np.array([[0.0, 0.0, 0.0], [0.0, 0.0, 1e-3]])
+    path = sr.follow_trajectory(arm, targets, WEIGHT, environment=ball, friction=50.0, q_motors0=held.q_motors)
+    assert path.contact_path is not None
+    assert path.contact_path.dissipation[-1] == 0.0
+    slips = [np.linalg.norm(one.slip) for row in path.contact_path.contacts for one in row]
+    assert max(slips) < 1e-5  # a stiff link leaves a rest along its axis that no spring prevents; the tip moves by 1e-3
+    assert path.tip_error.max() < 1e-9
+
+
+def test_what_friction_cannot_have_is_refused(arm: sr.SoftModel) -> None:
+    for options in ({}, {"environment": WALL, "allow_jumps": True}):
+        with pytest.raises(sr.ParameterError, match="friction"):
+            sr.follow_trajectory(arm, [(0.9, 0.0, 0.7)], friction=0.3, **options)
