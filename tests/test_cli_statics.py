@@ -677,6 +677,17 @@ def test_ik_jumps_only_if_told(told: Told, answer, tmp_path: Path) -> None:
     assert max(answer(*words, "--allow-jumps")["tip_error"]) <= 1e-9
 
 
+@pytest.mark.parametrize("words", [("solve", "inflatable_arm"), ("ik", *["inflatable_arm", "--target", "0.9", "0.3", "0.2"])])
+def test_a_result_is_saved_as_table_or_text(words: tuple[str, ...], tmp_path: Path) -> None:
+    """A CSV file of one row, and JSON that comes back as the same equilibrium."""
+    for name in ("a.csv", "a.json"):
+        assert main([*words, "--force", "0", "0", "-5", "-o", str(tmp_path / name)]) == 0
+    head, row = (tmp_path / "a.csv").read_text(encoding="utf-8").splitlines()
+    loaded = sr.load_result(tmp_path / "a.json")
+    held = loaded if isinstance(loaded, sr.Equilibrium) else loaded.equilibrium
+    assert float(dict(zip(head.split(","), row.split(","), strict=True))["tip z [m]"]) == held.tip_position[2]
+
+
 def test_without_a_command_the_help_says_what_to_do_first(capsys: pytest.CaptureFixture[str]) -> None:
     """Each of the three commands is one that can be read."""
     with pytest.raises(SystemExit, match="2"):
@@ -733,7 +744,10 @@ REFUSED = [
     (("load", "inflatable_arm", "--torques", *"123", "--motor-angle-std", "1", "2"), "--motor-angle-std must be 3 numbers"),
     (("load", "pcc_arm", "--torques", *"123456", "--motor-angle-std", "1"), "--motor-angle-std must be left out for a robot"),
     (("load", "inflatable_arm", "--torques", *"123", "--frame", "nobody"), "no frame is called 'nobody'"),
-    (("load", "inflatable_arm", "--torques", *"123", "-o", "x.csv"), "-o must be a file name that ends in .npz"),
+    (
+        ("load", "inflatable_arm", "--torques", *"123", "-o", "x.txt"),
+        "-o must be a file name that ends in .npz or .json or .csv",
+    ),
     (("load", "helix_tube", "--torques", "1"), "a robot with at least one motor"),
     (("load", "pcc_arm", "--muscles", "forces", "--torques", "1"), "a robot with muscles of given length"),
     (("ik", "inflatable_arm"), "one of the arguments --target --waypoints is required"),
@@ -757,7 +771,7 @@ REFUSED = [
     (("ik", *TARGET, "--method", "paper"), "--method must be given with --waypoints"),
     (("ik", *TARGET, "--gain", "3"), "--gain must be given with --method paper"),
     (("ik", *TARGET, "--allow-jumps"), "--allow-jumps must be given with --waypoints"),
-    (("ik", *TARGET, "-o", "x.csv"), "-o must be a file name that ends in .npz"),
+    (("ik", *TARGET, "-o", "x.txt"), "-o must be a file name that ends in .npz or .json or .csv or .yaml or .mcap"),
     (("ik", "helix_tube", "--target", "0", "0", "1"), "a robot with at least one motor"),
     (("ik", "inflatable_arm", "--waypoints", "nobody.csv"), "cannot read nobody.csv: No such file"),
     (("ik", "inflatable_arm", "--waypoints", CSV, "--orientation", *"001"), "--orientation must be given with --target"),
@@ -766,7 +780,7 @@ REFUSED = [
     (("ik", "inflatable_arm", "--waypoints", CSV, "--gain", "3"), "--gain must be given with --method paper"),
     (("ik", "inflatable_arm", "--waypoints", CSV, "--method", "paper", "--tolerance", "1"), "another method than paper"),
     (("ik", "inflatable_arm", "--waypoints", CSV, "--method", "paper", "--gain", "0"), "gain must be positive"),
-    (("ik", "inflatable_arm", "--waypoints", CSV, "-o", "x.txt"), "-o must be a file name that ends in .npz or .csv"),
+    (("ik", "inflatable_arm", "--waypoints", CSV, "-o", "x.txt"), "-o must be a file name that ends in .npz or .json or .csv"),
 ]
 
 

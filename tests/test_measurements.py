@@ -450,6 +450,8 @@ def test_a_fit_and_candidates_take_actuators_by_name() -> None:
     columns = dict(zip(names, q[:, [2, 0, 1]].T, strict=True))
     fits = [sr.identify(ARM, sr.Measurements(one, tip_position=tips, force=force), "stiffness") for one in (q, columns)]
     assert fits[0].solution.tolist() == fits[1].solution.tolist()
+    named = sr.identify("inflatable_arm", sr.Measurements(q, tip_position=tips, force=force), "stiffness")
+    assert named.parameters[0].name == "stiffness"
     chosen = [sr.informative_poses(ARM, "stiffness", one, 2, force=force).indices.tolist() for one in (q, columns)]
     assert chosen[0] == chosen[1]
     for wrong, kind, text in (

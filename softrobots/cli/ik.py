@@ -11,6 +11,7 @@ import pinocchio as pin
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import (
+    RESULT_FILES,
     ROS_FILES,
     add_output,
     add_plot,
@@ -86,9 +87,9 @@ def add_parser(subparsers: Any) -> None:
     help_text = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
     parser.add_argument("--allow-jumps", action="store_true", help=help_text)
     help_text = (
-        "the solution or trajectory as NPZ, for softrobots.load_result, as .yaml, a message of ROS 2, as .mcap, a log of "
+        "the solution or trajectory as .npz or .json, for softrobots.load_result, as a .csv table, as .yaml, a message of "
     )
-    add_output(parser, help_text + "ROS 2 and Foxglove (extra mcap), or a trajectory as a .csv table")
+    add_output(parser, help_text + "ROS 2, or as .mcap, a log of ROS 2 and Foxglove (extra mcap)")
     add_plot(parser, "the loaded shape, or the poses along the path")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -97,7 +98,7 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Solve and print the answer."""
     _refuse_contradictions(arguments)
-    check_output(arguments, ".npz", *([".csv"] if arguments.waypoints is not None else []), *ROS_FILES)
+    check_output(arguments, *RESULT_FILES, *ROS_FILES)
     check_plot(arguments)
     path = None if arguments.waypoints is None else read_waypoints(arguments.waypoints)
     model = statics_model_of(arguments)

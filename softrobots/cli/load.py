@@ -7,7 +7,7 @@ from typing import Any
 
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
 from softrobots.cli.options.load_argument import add_environment, environment_of
-from softrobots.cli.options.output_files import add_output, check_output, save
+from softrobots.cli.options.output_files import RESULT_FILES, add_output, check_output, save
 from softrobots.cli.options.robot_argument import (
     add_model,
     add_motors,
@@ -67,7 +67,7 @@ def add_parser(subparsers: Any) -> None:
         "--method", choices=METHODS, default="newton", help="the solver; alternation is the paper's (%(default)s)"
     )
     parser.add_argument("--max-iterations", type=int, metavar="N", help="most steps [-] (100 for newton, 1000 for alternation)")
-    add_output(parser, "the estimate as NPZ, for softrobots.load_result")
+    add_output(parser, "the estimate")
     parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
     add_json(parser)
     parser.set_defaults(run=run)
@@ -75,7 +75,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Estimate and print the answer."""
-    check_output(arguments, ".npz")
+    check_output(arguments, *RESULT_FILES)
     model, frame = statics_model_of(arguments), arguments.frame
     check_feels(model)
     if arguments.point is not None:

@@ -9,6 +9,7 @@ from typing import Any
 from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import (
+    RESULT_FILES,
     add_output,
     add_plot,
     check_ending,
@@ -55,7 +56,7 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--servo-stiffness", "K", help_text, nargs="+")
     help_text = "how many modes are shown, drawn and animated, slowest first [-] (%(default)s)"
     parser.add_argument("--count", type=int, default=6, metavar="N", help=help_text)
-    add_output(parser, "all modes as NPZ or .json, for softrobots.load_result, or as a .csv table")
+    add_output(parser, "all modes")
     add_plot(parser, "the shapes of the modes")
     help_text = "write an animated page of each mode, FILE_1.html and so on, in slow motion; they work offline (none)"
     parser.add_argument("--page", type=Path, metavar="FILE.html", help=help_text)
@@ -65,7 +66,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Find the modes and print the answer."""
-    check_output(arguments, ".npz", ".json", ".csv")
+    check_output(arguments, *RESULT_FILES)
     check_plot(arguments)
     positive_integer("--count", arguments.count)
     model = statics_model_of(arguments)

@@ -13,6 +13,7 @@ import numpy as np
 from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_loads, loads_of
 from softrobots.cli.options.output_files import (
+    RESULT_FILES,
     ROS_FILES,
     add_output,
     add_plot,
@@ -142,7 +143,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def _check_files(arguments: argparse.Namespace) -> None:
     """Refuse files that cannot be written, and options without effect, before the work."""
-    check_output(arguments, ".npz", ".json", ".csv", *ROS_FILES)
+    check_output(arguments, *RESULT_FILES, *ROS_FILES)
     for option in _PICTURES:
         check_plot(arguments, option)
     if arguments.page is not None:

@@ -68,8 +68,9 @@ class ParameterSet:
                 none that the robot accepts.
             DescriptionError: If the robot cannot be loaded.
         """
+        robot = load_model(robot) if isinstance(robot, str) else robot
         if not isinstance(robot, SoftModel) and not (dataclasses.is_dataclass(robot) and not isinstance(robot, type)):
-            raise ParameterError("robot", robot, "a robot (a dataclass of parameters) or a SoftModel")
+            raise ParameterError("robot", robot, "a robot (a dataclass of parameters), a name or a SoftModel")
         model = robot if isinstance(robot, SoftModel) else load_model(robot)  # type: ignore[arg-type]
         marked = {} if markers is None else dict(markers)
         for frame in marked.values():

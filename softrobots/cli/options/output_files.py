@@ -14,13 +14,17 @@ from softrobots.export.mcap_log import require_mcap, write_mcap
 from softrobots.export.ros_messages import to_ros2_yaml
 from softrobots.view.figures import canvas
 
+RESULT_FILES = (".npz", ".json", ".csv")
+"""Endings of files with the numbers of a result."""
+
 ROS_FILES = (".yaml", ".mcap")
 """Endings of files for ROS 2."""
 
 
 def add_output(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add `-o`, which saves `what`; `--overwrite` comes with `add_plot`."""
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"save {what} (not saved)")
+    """Add `-o`, which saves `what` as one of `RESULT_FILES`, or as `what` tells; `--overwrite` comes with `add_plot`."""
+    how = "" if " as " in what else " as .npz or .json, for softrobots.load_result, or as a .csv table"
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"save {what}{how} (not saved)")
 
 
 def check_output(arguments: argparse.Namespace, *endings: str) -> None:
