@@ -27,11 +27,15 @@ from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motor_torque import MotorTorque
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 
-_CHANGE = 1e-13  # of the coordinates at the middle, relative to max(1, |y|), below which an iteration ends a step
-_ROUNDED = 1e-9  # the same, below which an iteration that no longer shrinks has reached rounding
-_ITERATIONS = 30
+CHANGE = 1e-13
+"""Change of the coordinates at the middle, relative to max(1, |y|), below which an iteration ends a step."""
+ROUNDED = 1e-9
+"""The same, below which an iteration that no longer shrinks has reached rounding."""
+ITERATIONS = 30
+"""Most iterations of a step."""
+RENEWED = 8
+"""Iteration after which the matrix is computed again."""
 _SLOW = 0.1  # share of the last change, above which the matrix is computed again for motors that move by their torque
-_RENEWED = 8  # iteration after which the matrix is computed again
 
 Wrenches = Mapping[str, FloatArray]
 """Dead wrench by frame, shape (6,) [N, N m], world axes."""
@@ -46,6 +50,15 @@ class State(NamedTuple):
     """Actuators, then elastic coordinates, shape (n,) [rad, m or N]."""
     rates: FloatArray
     """Their rates, shape (n,)."""
+
+
+class Stage(NamedTuple):
+    """A robot at a stage of a step."""
+
+    state: State
+    """Its state."""
+    forces: FloatArray
+    """What acts on each coordinate from outside, shape (n,) [N m or N]."""
 
 
 class Step(NamedTuple):
@@ -65,6 +78,8 @@ class Step(NamedTuple):
     """Load in the middle."""
     friction_power: float = 0.0
     """Power that dry friction takes in the middle [W]."""
+    stages: tuple[Stage, ...] = ()
+    """Stages of equal weight, of a method that has more than that in the middle."""
 
     @property
     def length(self) -> float:
@@ -83,6 +98,9 @@ class Step(NamedTuple):
 
 class MidpointRule:
     """Steps of time of one robot under given inputs; keeps what the next step can use."""
+
+    order = 2
+    """Order of the error in the length of the steps."""
 
     def __init__(
         self,
@@ -108,8 +126,8 @@ class MidpointRule:
         self._at = self.free if torque else slice(m, n)  # the same, quickly
         self._block: Any = np.ix_(self.free, self.free) if torque else (self._at, self._at)
         self._damping = equations.damping[self._block]
-        self._past: list[tuple[float, FloatArray]] = []
         self._known: tuple[float, FloatArray] | None = None
+        self.forget()
 
     def kicked(self, state: State, change: FloatArray) -> State:
         r"""State after the velocities of prescribed coordinates jump by `change`, shape (n_motors,).
@@ -125,7 +143,7 @@ class MidpointRule:
 
     def forget(self) -> None:
         """Forget the last accelerations, which predict the next: the load jumps."""
-        self._past = []
+        self._past: list[tuple[float, FloatArray]] = []
 
     def step(self, start: State, end_time: float) -> Step | None:
         """Return the step from a state to a time; None if its equations could not be solved."""
@@ -147,7 +165,7 @@ class MidpointRule:
             x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
 
         solve, last, shrinking = None, np.inf, 0.0
-        for iteration in range(1, _ITERATIONS + 1):
+        for iteration in range(1, ITERATIONS + 1):
             move_middle(a)
             forces = equations.balance(x, rates, accelerations, wrenches)
             residual = forces[free]
@@ -155,14 +173,14 @@ class MidpointRule:
                 residual[: torque.count] -= torque.exerted(middle_time, x, rates)
             if not math.isfinite(residual.dot(residual)):
                 return None
-            if solve is None or iteration == _RENEWED or (torque is not None and shrinking > _SLOW):
+            if solve is None or iteration == RENEWED or (torque is not None and shrinking > _SLOW):
                 solve = self._factorised(middle_time, x, rates, wrenches, h)
             change = solve(residual)
             if torque is not None and torque.has_friction:
                 change = torque.with_friction(solve, change, (v0 + h * a)[: torque.count], h)
             a = a - change
             moved = 0.25 * h * h * math.sqrt(change.dot(change)) / size
-            if moved <= _CHANGE or (moved >= 0.5 * last and last <= _ROUNDED):
+            if moved <= CHANGE or (moved >= 0.5 * last and last <= ROUNDED):
                 break
             if not moved < 1e3 * last:
                 return None

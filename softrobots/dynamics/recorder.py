@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray, read_only
+from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import MidpointRule, State, Step
 from softrobots.dynamics.motion import Motion, MotionEnergy
 from softrobots.statics.kinematics import frame_placement
@@ -45,10 +46,14 @@ class Recorder:
         """Take a step; return how many rows there are more than ever before."""
         equations, middle, h = self._equations, step.middle, step.length
         dissipated, load_work, motor_work = self._works[-1]
-        dissipated += h * (float(middle.rates @ equations.damping @ middle.rates) + step.friction_power)
-        if step.wrenches:
-            load_work += h * float(equations.load(middle.x, step.wrenches) @ middle.rates)
-        motor_work += h * float(step.actuator_forces @ equations.actuator_rates(middle.x, middle.rates))
+        dissipated += h * step.friction_power
+        stages = [(one.state, one.forces[: equations.n_motors]) for one in step.stages]
+        for at, forces in stages or [(middle, step.actuator_forces)]:
+            share = h / (len(stages) or 1)
+            dissipated += share * float(at.rates @ equations.damping @ at.rates)
+            if step.wrenches:
+                load_work += share * float(equations.load(at.x, step.wrenches) @ at.rates)
+            motor_work += share * float(forces @ equations.actuator_rates(at.x, at.rates))
         prescribed, tip = self.rule.prescribed, self.tip(step.end.x)
         last = int(np.searchsorted(self._times, step.end.time, "right"))
         for row in range(self.rows, last):
@@ -95,7 +100,10 @@ class Recorder:
             times, n = self._times[:1], 1
             self._x[0], self._rates[0] = self.state.x, self.state.rates
         x, rates = self._x[:n], self._rates[:n]
-        exerted = self._at_rows(times, m)
+        if isinstance(self.rule, GaussRule):
+            exerted = np.array([self.rule.exerted(*row) for row in zip(x, rates, strict=True)])
+        else:
+            exerted = self._at_rows(times, m)
         exerted[:, : self._motor_torques.shape[1]] = self._motor_torques[:n]
         stored = np.array([equations.energies(*row) for row in zip(x, rates, strict=True)])
         works = np.array(self._works[: len(self.times)])

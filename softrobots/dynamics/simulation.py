@@ -14,13 +14,14 @@ from softrobots.core.errors import NotConverged, ParameterError
 from softrobots.core.progress import with_progress
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import MidpointRule
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.motor_torque import MOTORS, MotorTorque
 from softrobots.dynamics.recorder import Recorder
 from softrobots.dynamics.starting import first_kick, first_state
-from softrobots.dynamics.step_control import NoStep, choose, error_share, follow, halved, tip_distances
-from softrobots.dynamics.time_grid import grid_with_kicks, steps_and_rows
+from softrobots.dynamics.step_control import NoStep, choose, error_share, follow, halved, order_of_steps, tip_distances
+from softrobots.dynamics.time_grid import grid_of_rows, grid_with_kicks, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
@@ -46,12 +47,13 @@ def simulate(
     time_step: Any = None,
     output_step: Any = None,
     tolerance: Any = None,
+    order: Any = None,
     motors: str = "prescribed",
     torque: Any = None,
     sample_time: Any = None,
     progress: bool | str = False,
 ) -> Motion:
-    """Simulate the motion of a robot by the implicit midpoint rule (`softrobots.dynamics.midpoint`).
+    """Simulate the motion of a robot by implicit steps of time that damp nothing.
 
     Args:
         model: The robot.
@@ -71,6 +73,9 @@ def simulate(
         output_step: Time between two rows of the result [s]; by default 200 rows or a few less.
         tolerance: Largest error of the tip at any time of the run [m], by default 5e-4 of the robot's reach. It is measured:
             the run is repeated with every step halved until the difference says that it is met, see `Motion.tip_error`.
+        order: Order of the error in the length of the steps: 2 is the implicit midpoint rule (`softrobots.dynamics.midpoint`),
+            4 the method of Gauss with two stages (`softrobots.dynamics.gauss`), for motors and loads that stand still. None: 2
+            with a given `time_step`, where motors or loads move, and where springs have plateaus, else 4.
         motors: "prescribed": they move as `q_motors` says; "torque": motor joints move by `torque`, from where `start` has
             them, or else from where `q_motors` begins; it may be None after a start. Muscles follow `q_motors`.
         torque: Controller for motors="torque": a function of time, and positions and velocities of the motor joints, each shape
@@ -103,6 +108,7 @@ def simulate(
     beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
     first = first_state(model, start, path, 0 if drive is None else drive.count)
     h, largest, rows = steps_and_rows(end, model.reach, time_step, output_step, tolerance)
+    scheme = order_of_steps(order, h, model, path, load, free_motors=drive is not None)
     with one_blas_thread(model.n_springs):
         drives = None if drive is None else model.actuators.drives
         equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, mass_damping), drives)
@@ -110,7 +116,7 @@ def simulate(
         def new_run() -> Recorder:
             """A run from the first state, whose velocities take those with which prescribed motors begin."""
             controller = None if drive is None else MotorTorque(model, torque, sample_time)
-            rule = MidpointRule(equations, path, load, controller)
+            rule = (GaussRule if scheme == GaussRule.order else MidpointRule)(equations, path, load, controller)
             change = first_kick(path, first.rates[: model.n_motors])
             return Recorder(rule, first if change is None else rule.kicked(first, change), rows)
 
@@ -120,6 +126,8 @@ def simulate(
             stops = np.unique(np.concatenate([[end], path.breaks, load.breaks]))
         if drive is not None:
             stops = drive.with_samples(stops)
+        if h is None and scheme == GaussRule.order:
+            stops = grid_of_rows(rows)
         if h is not None:
             return _fixed(new_run(), stops, beta, progress)
         return _controlled(new_run, stops, largest, beta, progress)
@@ -135,27 +143,29 @@ def _fixed(run: Recorder, grid: FloatArray, damping_time: float | None, progress
 
 
 def _controlled(
-    new_run: Callable[[], Recorder], breaks: FloatArray, tolerance: float, damping_time: float | None, progress: bool | str
+    new_run: Callable[[], Recorder], stops: FloatArray, tolerance: float, damping_time: float | None, progress: bool | str
 ) -> Motion:
-    """Motion with steps for a tolerance of the tip."""
+    """Motion with steps for a tolerance of the tip, that end at `stops`."""
     facts: dict[str, Any] = {"damping_time": damping_time, "tolerance": tolerance, "tip_error": None}
     run, history, last = new_run(), [math.inf], math.inf
+    order = run.rule.order
     try:
-        _take(run, choose(run, breaks, tolerance), damping_time, progress, "motion")
+        first = choose(run, stops, tolerance) if order == MidpointRule.order else follow(run, stops)
+        _take(run, first, damping_time, progress, "motion")
         while True:
             finer = new_run()
             grid = halved(np.array(run.times))
             _take(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps")
             errors = tip_distances(run, finer)
             before, last = last, float(errors.max())
-            errors *= error_share(before, last)
+            errors *= error_share(before, last, order)
             history.append(float(errors.max()))
             facts["tip_error"] = history[-1]
             if history[-1] <= tolerance:
                 return finer.motion(**facts)
             if len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]:
                 why = "halving the steps brings the runs no closer, as in chaotic motion"
-            elif (needed := len(finer.times) * 2 ** math.ceil(0.5 * math.log2(history[-1] / tolerance))) > MOST_STEPS:
+            elif (needed := len(finer.times) * 2 ** math.ceil(math.log2(history[-1] / tolerance) / order)) > MOST_STEPS:
                 why = f"about {needed} would be needed, {MOST_STEPS} are the most"
             else:
                 run = finer

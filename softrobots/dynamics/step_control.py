@@ -19,13 +19,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import SoftRobotsError
-from softrobots.dynamics.midpoint import Step
+from softrobots.core.errors import ParameterError, SoftRobotsError
+from softrobots.dynamics.gauss import GaussRule
+from softrobots.dynamics.midpoint import MidpointRule, Step
 from softrobots.dynamics.recorder import Recorder
+from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
+from softrobots.model.soft_model import SoftModel
 
 _BLOCK = 40  # steps between two measurements of the drift
 _LONGEST = 1 / 80  # of the duration: no first step is longer
@@ -34,6 +38,7 @@ _QUIET = 2e-5  # of the tolerance: a block with less drift than this in each ste
 _COARSER = 10.0  # error of the first run over the tolerance, which that of a quarter of its steps meets
 _FADING = 0.9  # of the measured drift, from block to block
 _HALVINGS = 30  # of a step that fails
+_SMOOTH = {2: 4.0, 4: 8.0}  # largest r that is believed, for each order
 _LEAST = 1e-300  # distance that two runs have at least [m]
 
 SAFETY = 1.2
@@ -100,15 +105,43 @@ def halved(grid: FloatArray) -> FloatArray:
     return finer
 
 
-def error_share(before: float, now: float) -> float:
+def order_of_steps(
+    order: Any, time_step: float | None, model: SoftModel, path: MotorPath, load: TimeLoad, *, free_motors: bool = False
+) -> int:
+    """Return the order of the scheme, 2 or 4: that asked for, or 4 where steps are chosen and the motion is smooth.
+
+    Args:
+        order: What is asked for, or None.
+        time_step: Length of given steps [s]; None: they are chosen.
+        model: The robot.
+        path: Actuators over time.
+        load: Load over time.
+        free_motors: Whether motors move by their torque.
+
+    Raises:
+        ParameterError: If it is neither, or 4 where motors or loads move.
+    """
+    still = path.constant and load.constant and not free_motors
+    if order is None:
+        smooth = still and len(model.springs.beyond_plateaus(model.rest)) == 0
+        return GaussRule.order if smooth and time_step is None else MidpointRule.order
+    if order not in (GaussRule.order, MidpointRule.order) or isinstance(order, bool):
+        raise ParameterError("order", order, "2, 4 or None")
+    if order == GaussRule.order and not still:
+        raise ParameterError("order", order, "2 or None where motors or loads change over time")
+    return int(order)
+
+
+def error_share(before: float, now: float, order: int = 2) -> float:
     """Error that is stated of the finer of two runs over the distance of their tips, `SAFETY / (r - 1)`; see the module.
 
     Args:
         before: Distance of the tips of the two runs before [m]; infinite if there are none.
         now: Distance of the tips of the two runs [m].
+        order: Order of the scheme.
     """
     shrinking = before / max(now, _LEAST) if math.isfinite(before) else 2.0
-    return SAFETY / (min(max(shrinking, 2.0), 4.0) - 1.0)
+    return SAFETY / (min(max(shrinking, 2.0), _SMOOTH[order]) - 1.0)
 
 
 def tip_distances(coarse: Recorder, fine: Recorder) -> FloatArray:

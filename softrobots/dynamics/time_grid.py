@@ -13,6 +13,7 @@ from softrobots.core.errors import ParameterError
 TIP_TOLERANCE = 5e-4
 """Default of the largest error of the tip, relative to the reach of the robot."""
 
+_COARSEST = 100  # steps at least, of the first of the runs of fourth order
 _ROWS = 200  # of a motion, if no output step is given
 _MOST_TIMES = 10_000_000  # steps, rows or samples of a motion, for which memory suffices
 
@@ -31,6 +32,12 @@ def refuse_too_short(name: str, interval: float, duration: float) -> None:
 def time_grid(end: float, step: float) -> FloatArray:
     """Return times from zero to the end, `step` apart, the last one nearer if need be, shape (n,) [s]."""
     return np.append(step * np.arange(math.ceil(end / step - 1e-9)), end)
+
+
+def grid_of_rows(rows: FloatArray) -> FloatArray:
+    """Return the times of rows, with each interval divided evenly if they are few, shape (n,) [s]."""
+    parts = math.ceil(_COARSEST / (len(rows) - 1))
+    return np.append((rows[:-1, None] + np.diff(rows)[:, None] * np.arange(parts) / parts).ravel(), rows[-1])
 
 
 def grid_with_kicks(end: float, step: float, kicks: FloatArray) -> FloatArray:
