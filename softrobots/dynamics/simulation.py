@@ -20,7 +20,16 @@ from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.motor_torque import MOTORS, MotorTorque
 from softrobots.dynamics.recorder import Recorder
 from softrobots.dynamics.starting import first_kick, first_state
-from softrobots.dynamics.step_control import NoStep, choose, error_share, follow, halved, order_of_steps, tip_distances
+from softrobots.dynamics.step_control import (
+    NoStep,
+    choose,
+    error_share,
+    follow,
+    halved,
+    order_of_steps,
+    rule_of_order,
+    tip_distances,
+)
 from softrobots.dynamics.time_grid import grid_of_rows, grid_with_kicks, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
@@ -108,7 +117,7 @@ def simulate(
     beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
     first = first_state(model, start, path, 0 if drive is None else drive.count)
     h, largest, rows = steps_and_rows(end, model.reach, time_step, output_step, tolerance)
-    scheme = order_of_steps(order, h, model, path, load, free_motors=drive is not None)
+    scheme = order_of_steps(order, h, model, path.constant and load.constant and drive is None)
     with one_blas_thread(model.n_springs):
         drives = None if drive is None else model.actuators.drives
         equations = EquationsOfMotion(model, weight, damping_matrix(model, beta, mass_damping), drives)
@@ -116,7 +125,7 @@ def simulate(
         def new_run() -> Recorder:
             """A run from the first state, whose velocities take those with which prescribed motors begin."""
             controller = None if drive is None else MotorTorque(model, torque, sample_time)
-            rule = (GaussRule if scheme == GaussRule.order else MidpointRule)(equations, path, load, controller)
+            rule = rule_of_order(scheme)(equations, path, load, controller)
             change = first_kick(path, first.rates[: model.n_motors])
             return Recorder(rule, first if change is None else rule.kicked(first, change), rows)
 

@@ -28,7 +28,6 @@ from softrobots.core.errors import ParameterError, SoftRobotsError
 from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import MidpointRule, Step
 from softrobots.dynamics.recorder import Recorder
-from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 
 _BLOCK = 40  # steps between two measurements of the drift
@@ -105,23 +104,18 @@ def halved(grid: FloatArray) -> FloatArray:
     return finer
 
 
-def order_of_steps(
-    order: Any, time_step: float | None, model: SoftModel, path: MotorPath, load: TimeLoad, *, free_motors: bool = False
-) -> int:
+def order_of_steps(order: Any, time_step: float | None, model: SoftModel, still: bool) -> int:
     """Return the order of the scheme, 2 or 4: that asked for, or 4 where steps are chosen and the motion is smooth.
 
     Args:
         order: What is asked for, or None.
         time_step: Length of given steps [s]; None: they are chosen.
         model: The robot.
-        path: Actuators over time.
-        load: Load over time.
-        free_motors: Whether motors move by their torque.
+        still: Whether motors and loads stand still.
 
     Raises:
         ParameterError: If it is neither, or 4 where motors or loads move.
     """
-    still = path.constant and load.constant and not free_motors
     if order is None:
         smooth = still and len(model.springs.beyond_plateaus(model.rest)) == 0
         return GaussRule.order if smooth and time_step is None else MidpointRule.order
@@ -130,6 +124,11 @@ def order_of_steps(
     if order == GaussRule.order and not still:
         raise ParameterError("order", order, "2 or None where motors or loads change over time")
     return int(order)
+
+
+def rule_of_order(order: int) -> type[MidpointRule]:
+    """Return the scheme of an order, 2 or 4."""
+    return GaussRule if order == GaussRule.order else MidpointRule
 
 
 def error_share(before: float, now: float, order: int = 2) -> float:

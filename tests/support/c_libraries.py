@@ -34,7 +34,7 @@ def build_library(folder: Path, text: str, name: str) -> Path:
 class Controller:
     """What a control loop does with the file: an array of its own, and the places that the head of the file tells."""
 
-    def __init__(self, solver: CompiledModel, folder: Path, *, name: str, **options: bool) -> None:
+    def __init__(self, solver: CompiledModel, folder: Path, *, name: str, **options: Any) -> None:
         text = solver.c_source(prefix=name, **options)
         self.path = build_library(folder, text, name)
         self.place = {key: int(value) for key, value in re.findall(rf"^enum {{ {name}_(\w+) = (\d+) }};$", text, re.MULTILINE)}

@@ -25,6 +25,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import constants, vector
 from softrobots.compiled.settings import POSITIVE_PIVOT
+from softrobots.compiled.trace.complex_numbers import real_part
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger, smaller
 
 
@@ -152,10 +153,10 @@ def eliminate(
     min_pivot, n_negative_pivots = beyond.min_pivot, beyond.n_negative_pivots
     for j in range(k):
         pivot = block[j, j]
-        relative = pivot / scales[j]
+        relative = real_part(pivot) / scales[j]
         min_pivot = smaller(absolute(relative), min_pivot)
         n_negative_pivots = n_negative_pivots + if_less(relative, -POSITIVE_PIVOT, 1.0, 0.0)
-        if not multipliers:
+        if not multipliers and not (isinstance(pivot_shift, float) and pivot_shift == 0.0):
             pivot = if_less(0.0, pivot_shift, larger(absolute(pivot), pivot_shift * scales[j]), pivot)
         inverse.append(1.0 / pivot)
         for i in range(j + 1, k):

@@ -24,13 +24,16 @@ from softrobots.compiled.chain.articulated import (
 )
 from softrobots.compiled.chain.elements import Screw, Vector, constants, symmetric, turned, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Eliminated
+from softrobots.compiled.chain.gauss_step import corrections, right_hand_side
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.looped_chain import Kind
 from softrobots.compiled.chain.motion_groups import ElementParts, MovingGroup, group_signature, motion_groups, moving_parts
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block, TableColumns
+from softrobots.compiled.trace.complex_numbers import ComplexScalar, of_parts, parts_of
 from softrobots.compiled.trace.expressions import Expression, Scalar
+from softrobots.dynamics.gauss import GaussRule
 
 
 @dataclass(frozen=True)
@@ -41,20 +44,22 @@ class GroupLayout:
     """First of the places."""
     unknowns: int
     """Number of unknown strains."""
+    parts: int = 1
+    """Parts of a number of the elimination: 2 where it is complex."""
     frame: int = field(init=False)
     """Axes, angular velocity, angular acceleration and acceleration behind the last group of the outward pass (18)."""
     origin: int = field(init=False)
     """Position of its origin, where the tip is asked for [m] (3)."""
     inertia: int = field(init=False)
-    """Articulated inertia, upper triangle by columns (21)."""
+    """Articulated inertia, upper triangle by columns (21), or real and imaginary parts."""
     pull: int = field(init=False)
     """Forces on all beyond: their sum, and the products of levers and forces (12)."""
     wrench: int = field(init=False)
     """Moment and force that all bodies beyond need (6)."""
     sums: int = field(init=False)
-    """`s` of the elimination (6)."""
+    """`s` of the elimination (6), or real and imaginary parts."""
     answer: int = field(init=False)
-    """Angular and linear acceleration that the corrections so far add up to (6)."""
+    """Angular and linear acceleration that the corrections so far add up to (6), or real and imaginary parts."""
     base: int = field(init=False)
     """Frame behind the leading motors (18)."""
     cosine: int = field(init=False)
@@ -68,8 +73,8 @@ class GroupLayout:
 
     def __post_init__(self) -> None:
         """Compute the places."""
-        n = self.unknowns
-        passes = dict(frame=18, origin=3, inertia=21, pull=12, wrench=6, sums=6, answer=6)
+        n, k = self.unknowns, self.parts
+        passes = dict(frame=18, origin=3, inertia=21 * k, pull=12, wrench=6, sums=6 * k, answer=6 * k)
         assign_places(self, self.first, **passes, base=18, cosine=n, sine=n, bounds=2, end=0)
 
 
@@ -90,6 +95,8 @@ class _Record:
         return kept
 
     def _one(self, block: Block, value: Scalar) -> Scalar:
+        if isinstance(value, ComplexScalar):
+            return ComplexScalar(self._one(block, value.re), self._one(block, value.im))
         if not isinstance(value, Expression):
             return value
         if value.operation == "neg":
@@ -140,15 +147,34 @@ def _trace_kind(
         total = total if joint.shift is None else moved_wrench(total, joint.shift)
     back.store_all(places.wrench, total.tolist())
     gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
-    reduced, sums = carried_inward(factors, gradient, vector(back.loads(places.sums, 6)))
-    back.store_all(places.sums, sums.tolist())
-
+    blocks, layout = [out, factor, back, step, place], plan.layout
+    if layout.order == GaussRule.order:
+        back.store_all(layout.forces + layout.unknowns, gradient, "q")
+        back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at both stages.", names, out.trace)
+        blocks.append(back)
+        both = (back.loads(layout.forces + stage * layout.unknowns, len(gradient), "q") for stage in range(2))
+        gradient = right_hand_side(*both)
+    reduced, sums = carried_inward(factors, gradient, _loaded(back, places.sums, 6, places))
+    _store(back, places.sums, sums, places)
     kept = record.keep(back, vector(reduced)).tolist()
-    steps, answer = carried_outward(factors, kept, vector(step.loads(places.answer, 6)))
-    step.store_all(plan.layout.correction, steps.tolist(), "q")
-    step.store_all(places.answer, answer.tolist())
+    steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6, places))
+    stages = corrections(steps) if layout.order == GaussRule.order else (steps.tolist(),)
+    for stage, one in enumerate(stages):
+        step.store_all(layout.correction + stage * layout.unknowns, one, "q")
+    _store(step, places.answer, answer, places)
     _trace_place(place, places, group)
-    return Kind(number, [group[0] for group in groups], [out, factor, back, step, place], columns, record.size)
+    return Kind(number, [group[0] for group in groups], blocks, columns, record.size)
+
+
+def _loaded(block: Block, place: int, count: int, places: GroupLayout) -> Vector:
+    """Read real or complex numbers."""
+    values = block.loads(place, places.parts * count)
+    return vector(of_parts(values) if places.parts == 2 else values)
+
+
+def _store(block: Block, place: int, values: Sequence[Scalar], places: GroupLayout) -> None:
+    """Write real or complex numbers."""
+    block.store_all(place, parts_of(values) if places.parts == 2 else list(values))
 
 
 class _Moving(NamedTuple):
@@ -190,10 +216,10 @@ def _trace_factors(
     factor: Block, record: _Record, plan: MotionPlan, places: GroupLayout, group: MovingGroup, moving: _Moving
 ) -> ArticulatedGroup:
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
-    h, pulls = factor.load(plan.layout.time_step), vector(factor.loads(places.pull, 12))
-    inertia, pull = symmetric(factor.loads(places.inertia, 21), 6), Pull(pulls[:3], pulls[3:].reshape(3, 3))
-    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, group.own, h * h * 0.25)
-    factor.store_all(places.inertia, [inertia[index] for index in upper_triangle(6)])
+    (_, quarter), pulls = plan.factors(factor), vector(factor.loads(places.pull, 12))
+    inertia, pull = symmetric(_loaded(factor, places.inertia, 21, places), 6), Pull(pulls[:3], pulls[3:].reshape(3, 3))
+    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, group.own, quarter)
+    _store(factor, places.inertia, [inertia[index] for index in upper_triangle(6)], places)
     factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
     one = found.eliminated
     lower, inverses, coupling = (record.keep(factor, part) for part in (one.lower, one.inverse_pivots, one.coupling))

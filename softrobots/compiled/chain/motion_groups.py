@@ -57,7 +57,7 @@ class MovingGroup:
         """Axes of its end in those of its last element, shape (3, 3)."""
         self.reach = columns.entries([parts[group[-1]].reach for group in groups])
         """From its end to the beginning of the next group, or to the tip, in the axes of its end [m]."""
-        h, place = block.load(layout.time_step), 0
+        (half, quarter), place = plan.factors(block), 0
         for rows in zip(*groups, strict=True):
             ones = [unknowns.traced(row) for row in rows]
             element = replace(table_element(ones, columns), rotation=columns.entries([parts[row].rotation for row in rows]))
@@ -76,7 +76,7 @@ class MovingGroup:
                 )
                 place += 1
                 stiffness = element.stiffness[number]
-                self.own.append(h * 0.5 * damping + h * h * 0.25 * stiffness)
+                self.own.append(half * damping + quarter * stiffness)
                 self.torques.append((coordinates[axis] - rest[number]) * stiffness + damping * rates[axis])
             segment = unknowns.segment_at(rows[0])
             if segment is not None:

@@ -8,8 +8,13 @@ from functools import cached_property
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.motion_settings import KEPT_STEPS
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.complex_numbers import ComplexScalar
+from softrobots.compiled.trace.expressions import Scalar
+from softrobots.dynamics.gauss import EIGENVALUE, GaussRule
 
-_COUNTS = ("unknowns", "full_damping", "prepared")  # no places for callers
+_COUNTS = ("unknowns", "full_damping", "order", "prepared")  # no places for callers
+_OF_STAGES = ("stages", "forces")  # places only of a method with two stages
 
 
 @dataclass(frozen=True)
@@ -26,6 +31,8 @@ class MotionLayout:
     """Number of unknown strains."""
     full_damping: bool = False
     """Whether the damping is a matrix rather than a number for each unknown."""
+    order: int = 2
+    """Order of the steps: 2 by the midpoint rule, 4 by the method of Gauss with two stages."""
     motor_velocities: int = field(init=False)
     """Their velocities there (m) [rad/s or m/s]."""
     motor_accelerations: int = field(init=False)
@@ -45,7 +52,7 @@ class MotionLayout:
     acceleration: int = field(init=False)
     """Their accelerations there (n)."""
     correction: int = field(init=False)
-    """Newton's correction of the accelerations (n)."""
+    """Newton's correction of the accelerations (n), or of those at both stages (2, n)."""
     tip: int = field(init=False)
     """Tip at `unknown` and the motors, world axes [m] (3)."""
     position: int = field(init=False)
@@ -57,7 +64,7 @@ class MotionLayout:
     begin_velocity: int = field(init=False)
     """Their velocities there (n)."""
     history: int = field(init=False)
-    """The unknowns in the middle of the steps before, the last one first (`KEPT_STEPS`, n)."""
+    """The unknowns in the middle of the steps before, the last one first (`KEPT_STEPS`, n), or at both stages (.., 2, n)."""
     weights: int = field(init=False)
     """Weights of those in the extrapolation (`KEPT_STEPS`)."""
     n_history: int = field(init=False)
@@ -82,24 +89,30 @@ class MotionLayout:
     """1 where the corrections have converged, 0 where they have not."""
     failed: int = field(init=False)
     """1 for a lane that has not converged in some step."""
+    stages: int = field(init=False)
+    """Accelerations of the unknowns at both stages (2, n)."""
+    forces: int = field(init=False)
+    """What is out of balance on them there (2, n)."""
     prepared: int = field(init=False)
     """Values that do not depend on the unknowns, factors, records: as many places as the code needs."""
 
     def __post_init__(self) -> None:
         """Compute the places."""
-        m, n = self.motors, self.unknowns
+        m, n, k = self.motors, self.unknowns, 2 if self.order == GaussRule.order else 1
         damping = n * n if self.full_damping else n
         given = dict(motor_velocities=m, motor_accelerations=m, force=3, gravity=3, damping=damping)
-        middle = dict(time_step=1, unknown=n, rate=n, acceleration=n, correction=n, tip=3)
+        middle = dict(time_step=1, unknown=n, rate=n, acceleration=n, correction=k * n, tip=3)
         state = dict(position=n, velocity=n, begin_position=n, begin_velocity=n)
-        before = dict(history=KEPT_STEPS * n, weights=KEPT_STEPS, n_history=1, last_step=1)
+        before = dict(history=KEPT_STEPS * k * n, weights=KEPT_STEPS, n_history=1, last_step=1)
         path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1)
         search = dict(change=1, last_change=1, settled=1, failed=1)
-        assign_places(self, m, **given, **middle, **state, **before, **path, **search, prepared=0)
+        stages = dict.fromkeys(_OF_STAGES, (k - 1) * 2 * n)
+        assign_places(self, m, **given, **middle, **state, **before, **path, **search, **stages, prepared=0)
 
     def constants(self) -> dict[str, int]:
         """Return the places by their names in generated code."""
-        places = {name.upper(): place for name, place in vars(self).items() if name not in _COUNTS}
+        left_out = _COUNTS if self.order == GaussRule.order else _COUNTS + _OF_STAGES
+        places = {name.upper(): place for name, place in vars(self).items() if name not in left_out}
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
 
 
@@ -111,8 +124,18 @@ class MotionPlan:
     """The chain."""
     full_damping: bool = False
     """Whether the damping is a matrix."""
+    order: int = 2
+    """Order of the steps."""
 
     @cached_property
     def layout(self) -> MotionLayout:
         """Places of the numbers of a case."""
-        return MotionLayout(len(self.unknowns.chain.limits), len(self.unknowns.strains), self.full_damping)
+        return MotionLayout(len(self.unknowns.chain.limits), len(self.unknowns.strains), self.full_damping, self.order)
+
+    def factors(self, block: Block) -> tuple[Scalar, Scalar]:
+        """Return the factors of damping and stiffness in the matrix of a step: `h/2` and `h^2/4`, or complex ones."""
+        h = block.load(self.layout.time_step)
+        if self.order != GaussRule.order:
+            return h * 0.5, h * h * 0.25
+        once, twice = EIGENVALUE, EIGENVALUE * EIGENVALUE
+        return ComplexScalar(h * once.real, h * once.imag), ComplexScalar(h * h * twice.real, h * h * twice.imag)

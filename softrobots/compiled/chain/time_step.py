@@ -10,22 +10,33 @@ Motors move along the parabola through their positions at the beginning, in the 
 
 from __future__ import annotations
 
+from softrobots.compiled.chain.gauss_step import gauss_blocks
 from softrobots.compiled.chain.motion_layout import MotionLayout
 from softrobots.compiled.motion_settings import KEPT_STEPS, MOTION_ROUNDING, MOTION_TOLERANCE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
+from softrobots.dynamics.gauss import GaussRule
 
 
 def step_blocks(layout: MotionLayout) -> list[Block]:
     """Return the functions of an unknown `i`, that of a motor `i`, and the test of convergence."""
+    guess, apply, finish = gauss_blocks(layout) if layout.order == GaussRule.order else _midpoint_blocks(layout)
     return [
-        _guess(layout, Block("guess_unknown", "Extrapolate the middle of an unknown, and its acceleration.", ("i",))),
-        _apply(layout, Block("apply_correction", "Correct an acceleration, and its unknown in the middle.", ("i",))),
+        guess,
+        apply,
         _judge(layout, Block("judge_corrections", "Write `SETTLED`: whether the corrections of a step have converged.")),
-        _finish(layout, Block("finish_unknown", "Go to the end of the step, and remember the middle.", ("i",))),
+        finish,
         _interpolate(layout, Block("interpolate_unknown", "Place an unknown at `SHARE` of the step taken last.", ("i",))),
         _place_motor(layout, Block("place_motor", "Place a motor at `SHARE` of the whole step.", ("i",))),
     ]
+
+
+def _midpoint_blocks(layout: MotionLayout) -> tuple[Block, Block, Block]:
+    return (
+        _guess(layout, Block("guess_unknown", "Extrapolate the middle of an unknown, and its acceleration.", ("i",))),
+        _apply(layout, Block("apply_correction", "Correct an acceleration, and its unknown in the middle.", ("i",))),
+        _finish(layout, Block("finish_unknown", "Go to the end of the step, and remember the middle.", ("i",))),
+    )
 
 
 def _guess(layout: MotionLayout, block: Block) -> Block:

@@ -49,11 +49,21 @@ class _Joint(NamedTuple):
         return self.element.kind == "slide"
 
 
-def joints_of(plan: MotionPlan, block: Block) -> list[_Joint]:
-    """Return the elements at motors and unknowns of the workspace."""
-    unknowns, layout = plan.unknowns, plan.layout
+State = Sequence[Sequence[Scalar]]
+"""Unknowns, their velocities and their accelerations."""
+
+
+def state_of(plan: MotionPlan, block: Block) -> State:
+    """Return the state of the workspace."""
+    layout = plan.layout
+    return [block.loads(place, layout.unknowns) for place in (layout.unknown, layout.rate, layout.acceleration)]
+
+
+def joints_of(plan: MotionPlan, block: Block, state: State) -> list[_Joint]:
+    """Return the elements at the motors of the workspace and the unknowns of a state."""
+    unknowns = plan.unknowns
     rows = range(len(unknowns.chain.elements))
-    traced = [unknowns.traced(row, block.load, lambda place: block.load(layout.unknown + place)) for row in rows]
+    traced = [unknowns.traced(row, block.load, lambda place: state[0][place]) for row in rows]
     joints = []
     for element, given in zip(with_slack_hinges(unknowns, traced, unknowns.chain), unknowns.chain.elements, strict=True):
         (body,) = bodies_of(given)
@@ -70,12 +80,12 @@ def joints_of(plan: MotionPlan, block: Block) -> list[_Joint]:
 def tip_position(plan: MotionPlan, block: Block) -> list[Scalar]:
     """Return the tip at motors and unknowns of the workspace, world axes [m]."""
     tip = constants(plan.unknowns.chain.tip_translation)
-    for joint in reversed(joints_of(plan, block)):
+    for joint in reversed(joints_of(plan, block, state_of(plan, block))):
         tip = joint.origin + joint.axes @ tip
     return list(tip)
 
 
-def residual(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> list[Scalar]:
+def residual(plan: MotionPlan, block: Block, joints: Sequence[_Joint], state: State) -> list[Scalar]:
     """Return the torque out of balance on each unknown [N m or N]."""
     unknowns, layout = plan.unknowns, plan.layout
     chain = unknowns.chain
@@ -84,7 +94,7 @@ def residual(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> list[S
     force = vector(block.loads(layout.force, 3))
     wrenches = []
     for row, joint in enumerate(joints):
-        rate, change = _rates(plan, block, row)
+        rate, change = _rates(plan, block, row, state)
         lift = lift + cross(turning, joint.origin) + cross(spin, cross(spin, joint.origin))
         spin, turning, lift, force = (joint.axes.T @ one for one in (spin, turning, lift, force))
         if joint.slides:
@@ -106,7 +116,7 @@ def residual(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> list[S
         push = joint.axes @ push
         turn = joint.axes @ turn + cross(joint.origin, push)
     total = unknowns.in_order(torques)
-    rates, n = block.loads(layout.rate, layout.unknowns), layout.unknowns
+    rates, n = state[1], layout.unknowns
     if not layout.full_damping:
         return [one + block.load(layout.damping + row) * rates[row] for row, one in enumerate(total)]
     damping = [vector(block.loads(layout.damping + n * row, n)) for row in range(n)]
@@ -116,7 +126,7 @@ def residual(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> list[S
 def newton_matrix(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> Any:
     """Return `A`, shape (n, n)."""
     unknowns, layout = plan.unknowns, plan.layout
-    n, h = layout.unknowns, block.load(layout.time_step)
+    n, (half, quarter) = layout.unknowns, plan.factors(block)
     place = {row: unknowns.place[unknowns.moving(row)[0]] for row, joint in enumerate(joints) if joint.element.moving}
     matrix = constants(np.zeros((n, n)))
     beyond = CompositeBody(0.0, constants(np.zeros(3)), constants(np.zeros((3, 3))))
@@ -140,14 +150,14 @@ def newton_matrix(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> A
     for row, at in place.items():
         law = joints[row].element.law
         stiffness = joints[row].element.stiffness[0] if law is None else law.stiffness
-        matrix[at, at] = matrix[at, at] + h * h * 0.25 * stiffness
+        matrix[at, at] = matrix[at, at] + quarter * stiffness
         if law is not None and law.coupling is not None:  # with the inner spring of the hinge, the element before
             inner = place[row - 1]
-            matrix[at, inner] = matrix[inner, at] = matrix[at, inner] + h * h * 0.25 * law.coupling
+            matrix[at, inner] = matrix[inner, at] = matrix[at, inner] + quarter * law.coupling
     for row in range(n):
         for column in range(n) if layout.full_damping else [row]:
             damping = block.load(layout.damping + (n * row + column if layout.full_damping else row))
-            matrix[row, column] = matrix[row, column] + h * 0.5 * damping
+            matrix[row, column] = matrix[row, column] + half * damping
     return matrix
 
 
@@ -180,13 +190,13 @@ def solved(inverses: Sequence[Scalar], lower: Sequence[Sequence[Scalar]], side: 
     return values
 
 
-def _rates(plan: MotionPlan, block: Block, row: int) -> tuple[Scalar, Scalar]:
+def _rates(plan: MotionPlan, block: Block, row: int, state: State) -> tuple[Scalar, Scalar]:
     """Return velocity and acceleration of an element's coordinate."""
     layout, motor = plan.layout, plan.unknowns.motor(row)
     if motor is not None:
         return block.load(layout.motor_velocities + motor), block.load(layout.motor_accelerations + motor)
     at = plan.unknowns.place[plan.unknowns.moving(row)[0]]
-    return block.load(layout.rate + at), block.load(layout.acceleration + at)
+    return state[1][at], state[2][at]
 
 
 def _carried(element: TracedElement) -> Scalar:

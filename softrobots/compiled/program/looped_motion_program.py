@@ -7,6 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, vector
+from softrobots.compiled.chain.gauss_step import placing_blocks
 from softrobots.compiled.chain.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
 from softrobots.compiled.chain.motion_groups import motion_groups, reach_behind
 from softrobots.compiled.chain.motion_layout import MotionPlan
@@ -16,6 +17,7 @@ from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_parts import MotionParts
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import cosine, sine
+from softrobots.dynamics.gauss import GaussRule
 
 _PASSES = {
     "move": "Outward pass: motion of the bodies.",
@@ -24,7 +26,8 @@ _PASSES = {
     "correct": "Outward pass: correction of the accelerations.",
     "place": "Outward pass with positions alone.",
 }
-_INWARD = ("articulate", "resist")
+_REDUCE = "Inward pass: elimination of the torques at both stages."
+_INWARD = ("articulate", "resist", "reduce")
 
 _CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
     """Evaluate and factor; write the correction."""
@@ -57,13 +60,55 @@ def motion_tip_SUFFIX(w: Array) -> None:
     finish_place_SUFFIX(w)'''
 
 
+_STAGES_CONTROL = '''def resist_stage_SUFFIX(w: Array) -> None:
+    """Evaluate the stage that is placed."""
+    start_move_SUFFIX(w)
+    for i in range(N):
+        bend_SUFFIX(w, i)
+    move_all_SUFFIX(w)
+    start_resist_SUFFIX(w)
+    resist_all_SUFFIX(w)
+
+
+def resist_stages_SUFFIX(w: Array) -> None:
+    """Evaluate both stages."""
+    for i in range(N):
+        place_first_stage_SUFFIX(w, i)
+    resist_stage_SUFFIX(w)
+    for i in range(N):
+        place_second_stage_SUFFIX(w, i)
+    resist_stage_SUFFIX(w)
+
+
+def motion_factor_SUFFIX(w: Array) -> None:
+    """Evaluate and factor; write the correction."""
+    resist_stages_SUFFIX(w)
+    start_articulate_SUFFIX(w)
+    articulate_all_SUFFIX(w)
+    reduce_all_SUFFIX(w)
+    correct_all_SUFFIX(w)
+
+
+def motion_correct_SUFFIX(w: Array) -> None:
+    """Evaluate; write the correction with the factors that are there."""
+    resist_stages_SUFFIX(w)
+    reduce_all_SUFFIX(w)
+    correct_all_SUFFIX(w)
+
+
+'''
+
+
 def looped_motion(plan: MotionPlan) -> MotionParts:
     """Trace the functions of a looped chain."""
     unknowns, layout = plan.unknowns, plan.layout
-    places = GroupLayout(layout.prepared, layout.unknowns)
+    in_stages = layout.order == GaussRule.order
+    passes = _PASSES | ({"reduce": _REDUCE} if in_stages else {})
+    control = _STAGES_CONTROL + _CONTROL[_CONTROL.index("def motion_tip") :] if in_stages else _CONTROL
+    places = GroupLayout(layout.prepared, layout.unknowns, 2 if in_stages else 1)
     kinds = group_kinds(plan, places)
     record, sequence = places.end, {}
-    calls: dict[str, list[tuple[int, str]]] = {name: [] for name in _PASSES}
+    calls: dict[str, list[tuple[int, str]]] = {name: [] for name in passes}
     for kind in kinds:
         for place, row in enumerate(kind.rows):
             motor = unknowns.motor(row)
@@ -84,11 +129,12 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         _start_resist(plan, places),
         _start_place(plan, places, len(ordered)),
         _finish_place(plan, places),
+        *(placing_blocks(layout) if in_stages else []),
     ]
     loops, lane_loops = (
         [
-            *(loop_text(name, _PASSES[name], calls[name], back=name in _INWARD, suffix=suffix) for name in _PASSES),
-            _CONTROL.replace("_SUFFIX", suffix),
+            *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
+            control.replace("_SUFFIX", suffix),
         ]
         for suffix in ("", "_lanes")
     )
@@ -128,7 +174,7 @@ def _bend(plan: MotionPlan, places: GroupLayout) -> Block:
 
 def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_articulate", "Start at the tip with its force, without bodies beyond.")
-    block.store_all(places.inertia, [0.0] * 21)
+    block.store_all(places.inertia, [0.0] * 21 * places.parts)
     block.store_all(places.pull, [*_tip_force(plan, block), *[0.0] * 9])
     return block
 
@@ -136,8 +182,8 @@ def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
 def _start_resist(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_resist", "Start at the tip with its force, and clear all sums.")
     block.store_all(places.wrench, [0.0, 0.0, 0.0, *_tip_force(plan, block)])
-    block.store_all(places.sums, [0.0] * 6)
-    block.store_all(places.answer, [0.0] * 6)
+    block.store_all(places.sums, [0.0] * 6 * places.parts)
+    block.store_all(places.answer, [0.0] * 6 * places.parts)
     return block
 
 

@@ -4,9 +4,22 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from softrobots.compiled.chain.gauss_step import corrections, right_hand_side, stage_values
 from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.unrolled_motion import factored, joints_of, newton_matrix, residual, solved, tip_position
+from softrobots.compiled.chain.unrolled_motion import (
+    State,
+    factored,
+    joints_of,
+    newton_matrix,
+    residual,
+    solved,
+    state_of,
+    tip_position,
+)
 from softrobots.compiled.trace.blocks import Block, hoist
+from softrobots.compiled.trace.complex_numbers import of_parts, parts_of
+from softrobots.compiled.trace.expressions import Scalar
+from softrobots.dynamics.gauss import GaussRule
 
 
 @dataclass(frozen=True)
@@ -35,19 +48,35 @@ def unrolled_motion(plan: MotionPlan) -> MotionParts:
     layout, n = plan.layout, plan.layout.unknowns
     prepare = Block("motion_prepare", "Compute what depends on motors, force, gravity and time step only.")
     factor = Block("motion_factor", "Evaluate and factor; write the correction.", trace=prepare.trace)
-    joints = joints_of(plan, factor)
-    inverses, lower = factored(newton_matrix(plan, factor, joints))
+    in_stages = layout.order == GaussRule.order
+    states = [_stage_state(plan, factor, stage) for stage in range(2)] if in_stages else [state_of(plan, factor)]
+    joints = [joints_of(plan, factor, state) for state in states]
+    inverses, lower = factored(newton_matrix(plan, factor, joints[-1]))
     factors = [*inverses, *(one for row in lower for one in row)]
-    rest = residual(plan, factor, joints)
-    factor.store_all(layout.prepared, factors)
-    factor.store_all(layout.correction, solved(inverses, lower, rest))
+    torques = [residual(plan, factor, *both) for both in zip(joints, states, strict=True)]
+    rest = right_hand_side(*torques) if in_stages else torques[0]
+    flat = parts_of(factors) if in_stages else factors
+    factor.store_all(layout.prepared, flat)
+    factor.store_all(layout.correction, _corrections(solved(inverses, lower, rest), in_stages))
     correct = Block("motion_correct", "Evaluate; write the correction with the factors that are there.", trace=prepare.trace)
-    kept = correct.loads(layout.prepared, len(factors))
+    loaded = correct.loads(layout.prepared, len(flat))
+    kept = of_parts(loaded) if in_stages else loaded
     rows = [kept[n + row * (row - 1) // 2 : n + row * (row + 1) // 2] for row in range(n)]
-    correct.store_all(layout.correction, solved(kept[:n], rows, rest))
-    moving = [*kept, *correct.loads(layout.unknown, n), *correct.loads(layout.rate, n), *correct.loads(layout.acceleration, n)]
-    first = layout.prepared + len(factors)
+    correct.store_all(layout.correction, _corrections(solved(kept[:n], rows, rest), in_stages))
+    places = (layout.stages, layout.stages + n, layout.position, layout.velocity)
+    given = places if in_stages else (layout.unknown, layout.rate, layout.acceleration)
+    moving = [*loaded, *(one for place in given for one in correct.loads(place, n))]
+    first = layout.prepared + len(flat)
     size = first + hoist([factor, correct], prepare, moving, first)
     tip = Block("motion_tip", "Write the tip at motors and unknowns.")
     tip.store_all(layout.tip, tip_position(plan, tip))
     return MotionParts([prepare, factor, correct, tip], size)
+
+
+def _stage_state(plan: MotionPlan, block: Block, stage: int) -> State:
+    values = [stage_values(plan.layout, block, stage, place) for place in range(plan.layout.unknowns)]
+    return list(zip(*values, strict=True))
+
+
+def _corrections(found: list[Scalar], in_stages: bool) -> list[Scalar]:
+    return [one for part in corrections(found) for one in part] if in_stages else found

@@ -35,14 +35,14 @@ def check_motion(unknowns: Unknowns, *, full_damping: bool = False) -> None:
         raise ParameterError("model", unknowns.chain.name, f"a robot without {what}, to have its motion compiled")
 
 
-def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False) -> Program:
-    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix.
+def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order: int = 2) -> Program:
+    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix; `order`: of the steps.
 
     Raises:
         ParameterError: If the motion of its actuators is not compiled, or the damping of a long chain is a matrix.
     """
     check_motion(unknowns, full_damping=full_damping)
-    plan = MotionPlan(unknowns, full_damping)
+    plan = MotionPlan(unknowns, full_damping, order)
     layout = plan.layout
     parts = unrolled_motion(plan) if unknowns.is_unrolled else looped_motion(plan)
     blocks = [*parts.blocks, *step_blocks(layout)]

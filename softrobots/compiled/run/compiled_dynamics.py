@@ -14,7 +14,7 @@ from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks
-from softrobots.compiled.run.motion_runs import StepsTaken, halve_to_tolerance, replay, take_batch, take_one
+from softrobots.compiled.run.motion_runs import StepsTaken, first_grid, halve_to_tolerance, replay, take_batch, take_one
 from softrobots.compiled.run.results import CompiledMotion, MotionBatch, StepEnd
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
@@ -23,6 +23,7 @@ from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.starting import first_kick, first_state
+from softrobots.dynamics.step_control import order_of_steps
 from softrobots.dynamics.time_grid import grid_with_kicks, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
@@ -39,7 +40,7 @@ class CompiledDynamics(CompiledStatics):
     def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
         """Generate and load the code; call `softrobots.compile` instead."""
         super().__init__(model, backend, locked_strains)
-        self._motion_runs: dict[bool, Any] = {}
+        self._motion_runs: dict[tuple[bool, int], Any] = {}
         self._dampings: dict[tuple[float | None, float], FloatArray] = {}
 
     def simulate(
@@ -55,6 +56,7 @@ class CompiledDynamics(CompiledStatics):
         time_step: Any = None,
         output_step: Any = None,
         tolerance: Any = None,
+        order: Any = None,
     ) -> Motion:
         """Simulate the motion of the robot as `softrobots.simulate` does, with the same answer at the same steps.
 
@@ -69,6 +71,7 @@ class CompiledDynamics(CompiledStatics):
             time_step: Length of each step [s]; by default steps are halved until the tip is within the tolerance.
             output_step: Time between two rows of the result [s]; by default 200 rows, or fewer with given steps.
             tolerance: Largest error of the tip [m], measured with steps twice as long; by default 5e-4 of the reach.
+            order: Order of the error in the length of the steps, 2 or 4, as in `softrobots.simulate`.
 
         Returns:
             The motion; its torques and energies are computed when they are first asked for, by Pinocchio.
@@ -80,8 +83,9 @@ class CompiledDynamics(CompiledStatics):
         end = positive_number("duration", duration, "s")
         path, load = MotorPath(self._model, q_motors, end), TimeLoad(self._model, force, None, end)
         course = Course(path, load, SpringKicks(self._model, self._unknowns.strains))
-        run, given, damping = self._motion_code(gravity, damping_time, mass_damping)
         h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
+        scheme = order_of_steps(order, h, self._model, path.constant and load.constant)
+        run, given, damping = self._motion_code(gravity, damping_time, mass_damping, scheme)
         facts: dict[str, Any] = {
             "damping_time": None if damping_time is None else float(damping_time),
             "tolerance": None if h is not None else largest,
@@ -96,7 +100,7 @@ class CompiledDynamics(CompiledStatics):
         if h is not None:
             taken = take(grid_with_kicks(end, h, course.kicks))
         else:
-            taken = halve_to_tolerance(take, end, course.breaks, largest)
+            taken = halve_to_tolerance(take, first_grid(rows, course.breaks, scheme), largest, scheme)
             facts["tip_error"] = None if taken.errors is None else float(taken.errors[0])
         at_rows = replace(taken, rows=taken.rows[:, np.searchsorted(times, rows)])
         down = None if gravity is None else tuple(gravity_vector(gravity).tolist())
@@ -104,7 +108,7 @@ class CompiledDynamics(CompiledStatics):
         def again(steps: FloatArray, row_times: FloatArray) -> Motion:
             ends = take_one(run, state, given, course, steps, steps)
             ends = replace(ends, rows=np.concatenate(self._elastic_state(ends.rows[..., :-3]), axis=-1))
-            return replay(EquationsOfMotion(self._model, down, damping), course, ends, row_times, facts)
+            return replay(EquationsOfMotion(self._model, down, damping), course, ends, row_times, facts, scheme)
 
         found = at_rows.rows[0][np.isfinite(at_rows.rows[0, :, -1])]
         springs, rates = self._elastic_state(found[:, :-3])
@@ -138,6 +142,7 @@ class CompiledDynamics(CompiledStatics):
         gravity: Any = None,
         damping_time: Any = None,
         mass_damping: Any = 0.0,
+        order: Any = 2,
     ) -> StepEnd:
         """Take one step of time from a state, for an observer or a controller; `c_source(motion=True)` has it in C.
 
@@ -152,6 +157,8 @@ class CompiledDynamics(CompiledStatics):
             damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
             mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
 
+            order: Order of the error in the length of the step: 2, or 4 for motors that stand still.
+
         Returns:
             The state at the end.
 
@@ -159,7 +166,8 @@ class CompiledDynamics(CompiledStatics):
             ParameterError: If an argument has the wrong shape, is not finite or out of range, or its actuators are refused.
             NotConverged: If the step fails, even in small parts; `best` is None.
         """
-        run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
+        scheme = order_of_steps(order, time_step, self._model, np.ndim(q_motors) < 2)
+        run, given, _ = self._motion_code(gravity, damping_time, mass_damping, scheme)
         layout, n, strains = run.layout, self._model.n_springs, list(self._unknowns.strains)
         q_motors = self._model.actuators.in_order(q_motors, "q_motors")
         path = [q_motors] * 3 if np.ndim(q_motors) < 2 else finite_array("q_motors", q_motors, (3, self._motors), "rad")
@@ -195,6 +203,7 @@ class CompiledDynamics(CompiledStatics):
         time_step: Any = None,
         output_step: Any = None,
         tolerance: Any = None,
+        order: Any = None,
         threads: int = 1,
     ) -> MotionBatch:
         """Simulate many cases side by side, all with the same steps.
@@ -213,6 +222,7 @@ class CompiledDynamics(CompiledStatics):
             time_step: Length of each step [s]; by default steps are halved until all tips are within the tolerance.
             output_step: Time between two rows of the result [s]; by default 200 rows, or fewer with given steps.
             tolerance: Largest error of the tip in a row [m], measured with steps twice as long; by default 5e-4 of the reach.
+            order: Order of the error in the length of the steps, 2 or 4, as in `softrobots.simulate`.
             threads: Number of threads; more than one speeds up numba only.
 
         Returns:
@@ -224,9 +234,10 @@ class CompiledDynamics(CompiledStatics):
         """
         end = positive_number("duration", duration, "s")
         positive_integer("threads", threads)
-        run, given, _ = self._motion_code(gravity, damping_time, mass_damping)
         h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
         cases = MotionCases(self._model, self._actuation, end, q_motors, forces, starts)
+        scheme = order_of_steps(order, h, self._model, cases.stand_still)
+        run, given, _ = self._motion_code(gravity, damping_time, mass_damping, scheme)
         strains, spring_kicks = list(self._unknowns.strains), SpringKicks(self._model, self._unknowns.strains)
         springs, rates = (np.array(one[:, strains]) for one in cases.state)
         cases.kick(spring_kicks, 0.0, slice(None), springs, rates)
@@ -239,18 +250,11 @@ class CompiledDynamics(CompiledStatics):
         if h is not None:
             taken = take(grid_with_kicks(end, h, cases.kicks))
         else:
-            taken = halve_to_tolerance(take, end, cases.breaks, largest, cases.bad)
+            taken = halve_to_tolerance(take, first_grid(rows, cases.breaks, scheme), largest, scheme, cases.bad)
         found = taken.rows[:, np.searchsorted(times, rows)]
         fail(taken.status, cases.bad, [], [found])
-        batch = MotionBatch(
-            rows,
-            *self._elastic_state(found[..., :-3]),
-            np.ascontiguousarray(found[..., -3:]),
-            taken.status,
-            taken.grid,
-            taken.errors,
-            None if h is not None else largest,
-        )
+        tips, asked = np.ascontiguousarray(found[..., -3:]), None if h is not None else largest
+        batch = MotionBatch(rows, *self._elastic_state(found[..., :-3]), tips, taken.status, taken.grid, taken.errors, asked)
         if not taken.is_within:
             raise NotConverged(
                 f"the tips are not known to {largest:.3g} m after a run with {len(taken.grid) - 1} steps; a shorter duration "
@@ -261,7 +265,7 @@ class CompiledDynamics(CompiledStatics):
             )
         return batch
 
-    def _motion_code(self, gravity: Any, damping_time: Any, mass_damping: Any) -> tuple[Any, Any, FloatArray]:
+    def _motion_code(self, gravity: Any, damping_time: Any, mass_damping: Any, order: int) -> tuple[Any, Any, FloatArray]:
         """Return the code, what stands in its workspace of gravity and damping, and the damping of the elastic coordinates."""
         check_motion(self._unknowns)
         down = gravity_vector(gravity)
@@ -273,9 +277,10 @@ class CompiledDynamics(CompiledStatics):
         strains = list(self._unknowns.strains)
         own = damping[np.ix_(strains, strains)]
         full = bool(np.any(own != np.diag(np.diag(own))))
-        run = self._motion_runs.get(full)
-        if run is None:
-            run = self._motion_runs[full] = make_run(make_motion_program(self._unknowns, full_damping=full), self._backend)
+        if (full, order) not in self._motion_runs:
+            program = make_motion_program(self._unknowns, full_damping=full, order=order)
+            self._motion_runs[full, order] = make_run(program, self._backend)
+        run = self._motion_runs[full, order]
         return run, [(run.layout.damping, own.ravel() if full else np.diag(own)), (run.layout.gravity, down)], damping
 
     def _first_state(self, course: Course, start: Any) -> tuple[FloatArray, FloatArray]:

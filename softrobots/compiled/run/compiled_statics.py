@@ -17,6 +17,7 @@ from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatc
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.dynamics.step_control import order_of_steps
 from softrobots.model.soft_model import SoftModel
 
 NO_FORCE = read_only(np.zeros(3))
@@ -81,7 +82,15 @@ class CompiledStatics:
         program = make_motion_program(self._unknowns) if motion else self._run(gravity).program
         return str(program.text + ("\n\n" + program.lane_text if lanes else ""))
 
-    def c_source(self, *, gravity: bool = False, prefix: str = "softrobots", poses: bool = False, motion: bool = False) -> str:
+    def c_source(
+        self,
+        *,
+        gravity: bool = False,
+        prefix: str = "softrobots",
+        poses: bool = False,
+        motion: bool = False,
+        order: int = 2,
+    ) -> str:
         """Return the generated code as freestanding C99: one file without libraries, allocation or state, for a control loop.
 
         Every function works on an array of doubles that the caller owns. The comment at the head of the file lists inputs and
@@ -93,6 +102,7 @@ class CompiledStatics:
             prefix: Beginning of every name, before an underscore.
             poses: Return the code whose targets are poses.
             motion: Return the code of motion instead of that of statics; it always has gravity.
+            order: Order of the steps of motion: 2, or 4 for motors that stand still.
 
         Raises:
             ParameterError: If the prefix is not an identifier of C, the robot cannot have poses as targets, or motion is asked
@@ -102,7 +112,8 @@ class CompiledStatics:
 
         if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
             raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
-        program = make_motion_program(self._unknowns) if motion else self._run(gravity, poses).program
+        order_of_steps(order, None, self._model, still=True)
+        program = make_motion_program(self._unknowns, order=order) if motion else self._run(gravity, poses).program
         return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
 
     def js_source(self, *, gravity: bool = True, points: int = 4) -> str:

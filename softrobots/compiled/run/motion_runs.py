@@ -16,10 +16,12 @@ from softrobots.compiled.run.motion_course import Course, SpringKicks, forces_of
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.equations import EquationsOfMotion
-from softrobots.dynamics.midpoint import MidpointRule, State, Step
+from softrobots.dynamics.gauss import GaussRule
+from softrobots.dynamics.midpoint import State, Step
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.recorder import Recorder
-from softrobots.dynamics.step_control import error_share, halved
+from softrobots.dynamics.step_control import error_share, halved, rule_of_order
+from softrobots.dynamics.time_grid import grid_of_rows
 
 _FIRST_STEPS = 400  # of the first of the runs that are compared
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
@@ -52,17 +54,24 @@ class StepsTaken:
     """Whether that is within the tolerance; so are fixed steps."""
 
 
+def first_grid(rows: FloatArray, breaks: FloatArray, order: int) -> FloatArray:
+    """Return the steps of the first of the runs that are compared, which end at `breaks`, or at the rows, shape (n,) [s]."""
+    if order == GaussRule.order:
+        return grid_of_rows(rows)
+    end = float(rows[-1])
+    stops = np.unique([0.0, *(time for time in breaks.tolist() if 1e-9 * end < time < end * (1.0 - 1e-9)), end])
+    ends = zip(stops[:-1], stops[1:], np.ceil(np.diff(stops) / end * _FIRST_STEPS).astype(int) + 1, strict=True)
+    return np.append(np.concatenate([np.linspace(one, other, count)[:-1] for one, other, count in ends]), end)
+
+
 def halve_to_tolerance(
-    take: Callable[[FloatArray], StepsTaken], end: float, breaks: FloatArray, tolerance: float, bad: Any = False
+    take: Callable[[FloatArray], StepsTaken], grid: FloatArray, tolerance: float, order: int, bad: Any = False
 ) -> StepsTaken:
     """Halve all steps until the tips of the valid cases are known to a tolerance; return the last run.
 
     The error of the finer of two runs is stated from the difference of their tips by `softrobots.dynamics.step_control`, as in
     `simulate`. `bad` marks cases that do not count.
     """
-    stops = np.unique([0.0, *(time for time in breaks.tolist() if 1e-9 * end < time < end * (1.0 - 1e-9)), end])
-    ends = zip(stops[:-1], stops[1:], np.ceil(np.diff(stops) / end * _FIRST_STEPS).astype(int) + 1, strict=True)
-    grid = np.append(np.concatenate([np.linspace(one, other, count)[:-1] for one, other, count in ends]), end)
     before, history, last = take(grid), [math.inf], math.inf
     while not before.interrupted:
         grid = halved(grid)
@@ -73,7 +82,7 @@ def halve_to_tolerance(
         errors = np.where(before.status == Status.CERTIFIED, errors, np.inf)
         counts = (now.status == Status.CERTIFIED) & ~np.asarray(bad)
         furthest = float(errors[counts].max(initial=0.0))
-        errors *= error_share(last, furthest)
+        errors *= error_share(last, furthest, order)
         now, last = replace(now, errors=np.where(counts, errors, np.inf)), furthest
         history.append(float(errors[counts].max(initial=0.0)))
         stalled = len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]
@@ -160,8 +169,12 @@ def _times_within(times: FloatArray, grid: FloatArray, first: int, end: int) -> 
     return slice(begin, len(times) if end == len(grid) - 1 else int(np.searchsorted(times, grid[end], "right")))
 
 
-def replay(equations: EquationsOfMotion, course: Course, taken: StepsTaken, rows: FloatArray, facts: dict[str, Any]) -> Motion:
+def replay(
+    equations: EquationsOfMotion, course: Course, taken: StepsTaken, rows: FloatArray, facts: dict[str, Any], order: int
+) -> Motion:
     """Return the motion with torques and energies, by Pinocchio, from the states at the ends of all steps.
+
+    Steps of fourth order are taken again, each from where the compiled ones came to.
 
     Args:
         equations: Equations of motion.
@@ -169,13 +182,23 @@ def replay(equations: EquationsOfMotion, course: Course, taken: StepsTaken, rows
         taken: The steps, with a row at each end of a step; elastic coordinates and rates instead of unknowns and theirs.
         rows: Times of the rows, shape (n,) [s].
         facts: Other fields of the motion.
+        order: Order of the steps.
     """
     m, k, count = equations.n_motors, equations.n - equations.n_motors, 2 * len(taken.grid) - 1
     motors, states = np.broadcast_to(motors_of_steps(course.path, taken.grid), (count, m)), taken.rows[0]
     begin = State(0.0, np.concatenate([motors[0], states[0, :k]]), np.concatenate([np.zeros(m), states[0, k : 2 * k]]))
-    recorder = Recorder(MidpointRule(equations, course.path, course.load), begin, rows)
+    recorder = Recorder(rule_of_order(order)(equations, course.path, course.load), begin, rows)
     for step, end in enumerate(taken.grid[1:].tolist()):
         before = recorder.state
+        if order == GaussRule.order:
+            again = recorder.rule.step(before, end)
+            if again is not None:
+                reached = (
+                    np.concatenate([motors[0], states[step + 1, :k]]),
+                    np.concatenate([np.zeros(m), states[step + 1, k : 2 * k]]),
+                )
+                recorder.add(again._replace(end=State(end, *reached)))
+            continue
         h, middle_time = end - before.time, 0.5 * (before.time + end)
         u0, middle, u1 = motors[2 * step : 2 * step + 3]
         y1, v1, v0 = states[step + 1, :k], states[step + 1, k : 2 * k], before.rates[m:]

@@ -148,7 +148,7 @@ class MotionBatches:
         n, m = layout.unknowns, layout.motors
         w: list[Any] = [0.0] * self._size
         w[layout.position : layout.velocity + n] = np.zeros((2 * n, count))
-        w[layout.history : layout.history + KEPT_STEPS * n] = np.zeros((KEPT_STEPS * n, count))
+        w[layout.history : layout.weights] = np.zeros((layout.weights - layout.history, count))
         for place, values in zip(places, inputs, strict=True):
             w[place : place + values.shape[1]] = list(values.T)
         failed = np.zeros(count, dtype=bool)

@@ -1,0 +1,104 @@
+r"""Steps of fourth order, traced: the method of Gauss with two stages, see `softrobots.dynamics.gauss`.
+
+The functions have the names and the work of those of the midpoint rule in `softrobots.compiled.chain.time_step`, so that the
+drivers are the same. Each has both stages of an unknown; the residuals of both make one complex right-hand side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from softrobots.compiled.chain.motion_layout import MotionLayout
+from softrobots.compiled.motion_settings import KEPT_STEPS
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.complex_numbers import ComplexScalar, parts_of
+from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
+from softrobots.dynamics.gauss import FROM_SQUARES, SECOND, SQUARES, STAGES, WEIGHTS
+
+
+def stage_values(layout: MotionLayout, block: Block, stage: int, place: int = 0, base: str = "") -> tuple[Scalar, ...]:
+    """Return an unknown at a stage, its velocity and its acceleration."""
+    h = block.load(layout.time_step)
+    position, velocity = (block.load(first + place, base) for first in (layout.position, layout.velocity))
+    accelerations = [block.load(layout.stages + row * layout.unknowns + place, base) for row in range(2)]
+    middle = position + h * (velocity * STAGES[stage] + h * _weighted(SQUARES[stage], accelerations))
+    return middle, velocity + h * _weighted(WEIGHTS[stage], accelerations), accelerations[stage]
+
+
+def right_hand_side(one: Sequence[Scalar], other: Sequence[Scalar]) -> list[Scalar]:
+    """Return the complex right-hand side of the torques out of balance at both stages."""
+    return [ComplexScalar(first, second * SECOND) for first, second in zip(one, other, strict=True)]
+
+
+def corrections(found: Sequence[Scalar]) -> tuple[list[Scalar], list[Scalar]]:
+    """Return the corrections of the accelerations at both stages from the complex ones."""
+    parts, n = parts_of(found), len(found)
+    return parts[:n], [one * (1.0 / SECOND) for one in parts[n:]]
+
+
+def gauss_blocks(layout: MotionLayout) -> tuple[Block, Block, Block]:
+    """Return the functions that guess, correct and finish an unknown `i`."""
+    return (
+        _guess(layout, Block("guess_unknown", "Extrapolate an unknown at both stages, and its accelerations.", ("i",))),
+        _apply(layout, Block("apply_correction", "Correct the accelerations at both stages.", ("i",))),
+        _finish(layout, Block("finish_unknown", "Go to the end of the step, and remember the stages.", ("i",))),
+    )
+
+
+def placing_blocks(layout: MotionLayout) -> list[Block]:
+    """Return the functions that write an unknown `i` at a stage to where the passes over the elements read it."""
+    blocks = [Block(f"place_{name}_stage", f"Place an unknown at the {name} stage.", ("i",)) for name in ("first", "second")]
+    for stage, block in enumerate(blocks):
+        places = layout.unknown, layout.rate, layout.acceleration
+        for place, value in zip(places, stage_values(layout, block, stage, 0, "i"), strict=True):
+            block.store(place, value, "i")
+    blocks[1].store(layout.forces, blocks[1].load(layout.forces + layout.unknowns, "i"), "i")  # of the first stage
+    return blocks
+
+
+def _guess(layout: MotionLayout, block: Block) -> Block:
+    h, n = block.load(layout.time_step), layout.unknowns
+    position, velocity = (block.load(place, "i") for place in (layout.position, layout.velocity))
+    beyond: list[Scalar] = []
+    for stage, share in enumerate(STAGES):
+        coasting = position + h * velocity * share
+        one: Scalar = 0.0
+        for place in range(KEPT_STEPS):
+            earlier = block.load(layout.history + (2 * place + stage) * n, "i")
+            one = one + (earlier - coasting) * block.load(layout.weights + place)
+        beyond.append(one)
+    for stage, row in enumerate(FROM_SQUARES):
+        block.store(layout.stages + stage * n, _weighted(row, beyond) / (h * h), "i")
+    return block
+
+
+def _apply(layout: MotionLayout, block: Block) -> Block:
+    h, n = block.load(layout.time_step), layout.unknowns
+    steps = [block.load(layout.correction + stage * n, "i") for stage in range(2)]
+    change: Scalar = block.load(layout.change)
+    for stage, step in enumerate(steps):
+        block.store(layout.stages + stage * n, block.load(layout.stages + stage * n, "i") + step, "i")
+        size = larger(absolute(stage_values(layout, block, stage, 0, "i")[0]), 1.0)
+        moved = absolute(_weighted(SQUARES[stage], steps)) * (h * h) / size
+        change = larger(change, if_less(moved, 1e300, moved, 1e300))  # also of NaN
+    block.store(layout.change, change)
+    return block
+
+
+def _finish(layout: MotionLayout, block: Block) -> Block:
+    h, n = block.load(layout.time_step), layout.unknowns
+    position, velocity = (block.load(place, "i") for place in (layout.position, layout.velocity))
+    accelerations = [block.load(layout.stages + stage * n, "i") for stage in range(2)]
+    beyond = _weighted([0.5 * (1.0 - share) for share in STAGES], accelerations)
+    block.store(layout.position, position + h * (velocity + h * beyond), "i")
+    block.store(layout.velocity, velocity + h * 0.5 * (accelerations[0] + accelerations[1]), "i")
+    for stage in range(2):
+        block.store(layout.history + stage * n, stage_values(layout, block, stage, 0, "i")[0], "i")
+        for place in range(1, KEPT_STEPS):
+            earlier = block.load(layout.history + (2 * place - 2 + stage) * n, "i")
+            block.store(layout.history + (2 * place + stage) * n, earlier, "i")
+    return block
+
+
+def _weighted(weights: Sequence[float], values: Sequence[Scalar]) -> Scalar:
+    return values[0] * weights[0] + values[1] * weights[1]
