@@ -12,8 +12,8 @@ from scipy.integrate import solve_ivp
 import softrobots as sr
 from softrobots.core.errors import ParameterError
 from tests.support.c_libraries import Controller
+from tests.support.pendulums import LENGTH, MASS, double_pendulum, pendulum, tip_of
 from tests.support.serial_chains import ROBOTS
-from tests.test_motion import LENGTH, MASS, double_pendulum, pendulum, tip_of
 
 GRAVITY = (0.7, -0.4, -9.7)
 
