@@ -183,8 +183,9 @@ def overview(record: Mapping[str, Any]) -> Overview:
         "[silicone arm of two segments, 0.29 m](#a-silicone-arm-under-pressure), bent by the pressures of six chambers",
         f"[3d-soft-trunk](references.md#measurements), {len(record['found'])} records",
         "none stated; numbers quoted",
-        "bends of both segments",
-        f"{upper:.2f} of up to {most[0]:.2f} rad, {lower:.2f} of up to {most[1]:.2f} rad",
+        "bends of both segments, place of the tip",
+        f"{upper:.2f} of up to {most[0]:.2f} rad, {lower:.2f} of up to {most[1]:.2f} rad; "
+        f"at the tip {1e3 * record['tip_m']:.0f} mm",
         "nothing; where chambers push is read from the records",
         "`python scripts/measured.py soft_arm`",
     )
