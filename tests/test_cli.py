@@ -84,7 +84,6 @@ def test_version(capsys: pytest.CaptureFixture) -> None:
 @each_row(
     ("words", "message"),
     [
-        ([], "required: COMMAND"),
         (["nothing"], "invalid choice: 'nothing'; choose from urdf, export, solve, branches, load, "),
         (["slove"], "invalid choice: 'slove' (did you mean 'solve'?)"),
         (["solve", "inflatable_arm", "--method", "newtn"], "invalid choice: 'newtn' (did you mean 'newton'?)"),

@@ -616,7 +616,7 @@ def test_shapes_are_those_of_drake(tool: Tool, tmp_path: Path) -> None:
 def test_a_robot_without_shapes_and_far_from_the_origin_can_be_viewed(tool: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     tool("pydrake")
     cameras = []
-    monkeypatch.setattr(Stage, "look_from", lambda self, eye, centre: cameras.append((eye, centre)))
+    monkeypatch.setattr(Stage, "look_from", lambda self, eye, centre, *narrow: cameras.append((eye, centre)))
     far = np.array([3.0, 4.0, 0.5])
     arm = link("c", pose='<pose relative_to="b">0.4 0 0 0 0 0</pose>') + sdf_joint("k", "b", "c", SPRING)
     model = sr.load_model(chain(more=arm).replace("<link", "<pose>3 4 0.5 0 0 0</pose><link", 1))

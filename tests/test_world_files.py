@@ -74,7 +74,8 @@ def distances(environment: Environment, points: FloatArray) -> dict[str, FloatAr
     """Signed distances of points, shape (m, 3), from each obstacle by its name; from meshes without sign, by trimesh."""
     found = {}
     for field, places in obstacle_fields(environment):
-        found |= {environment.names[place]: field.distance(points)[:, i] for i, place in enumerate(places.tolist())}
+        for body, place in enumerate(places.tolist()):
+            found[environment.names[place]] = field.at(points, np.full(len(points), body))[0]
     for mesh in environment:
         if isinstance(mesh, Mesh):
             body = trimesh.Trimesh(mesh.vertices, mesh.triangles).apply_transform(mesh.transform_to_world)
