@@ -183,7 +183,7 @@ def test_loads_and_actuators_are_parameters_of_derivatives() -> None:
         (ARM, ("stiffness", "stiffness"), sr.ParameterError, "there once"),
         (ARM, ("motor[1].offset", "motor[*].offset"), sr.ParameterError, "named once"),
         (ARM, (), sr.ParameterError, "hinge_offset"),
-        (ARM.urdf(), "stiffness", sr.ParameterError, "a SoftModel"),
+        (ARM.urdf(), "stiffness", sr.NameNotFound, r"joint\[spring_1_up\].stiffness"),  # a robot without a dataclass
         (sr.InflatableArm, "stiffness", sr.ParameterError, "a SoftModel"),
         (sr.load_model(ARM.urdf()), "stiffness", sr.NameNotFound, r"joint\[spring_1_up\].stiffness"),
     ],
