@@ -93,6 +93,11 @@ class Goal(NamedTuple):
         reached = pose.translation if self.offset is None else pose.act(self.offset)
         return self.position - reached, self._turn(pose.rotation)
 
+    def difference(self, model: SoftModel, q: FloatArray) -> FloatArray:
+        """Return the difference from the tip to the goal, shape (3 or 6,), rotations times the lever [m]."""
+        translation, turn = self.missing(model, q)
+        return translation if self.rotation is None else np.concatenate([translation, LEVER * model.reach * turn])
+
     def _turn(self, rotation: FloatArray) -> FloatArray:
         if self.rotation is None:
             return np.zeros(3)
@@ -166,10 +171,7 @@ class LoadedTip:
 
     def missing(self, state: ElasticState) -> FloatArray:
         """Return the difference from the tip to the goal, shape (3 or 6,), rotations times the lever [m]."""
-        translation, turn = self.goal.missing(self.model, state.q)
-        if self.goal.rotation is None:
-            return translation
-        return np.concatenate([translation, LEVER * self.model.reach * turn])
+        return self.goal.difference(self.model, state.q)
 
     def motion(self, state: ElasticState) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of tip and elastic coordinates by the actuators; see `sensitivity.tip_motion`."""

@@ -23,9 +23,6 @@ from softrobots.compiled.trace.expressions import Expression, Scalar, cosine, si
 SECTION_AXES = (0, 1, 2, 0, 1, 2)
 """Axis of each joint of a section: x, y, z."""
 
-SECTION_CHORD = 2
-"""The joint of a section that slides."""
-
 
 class RigidBody(NamedTuple):
     """A rigid body fixed to a frame; numbers are constants or table entries."""

@@ -26,7 +26,8 @@ class ByMotors(NamedTuple):
 
 def newton_change(here: Balance, coefficient: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Return Newton's change of coordinates, shape (n,), normal forces, shape (m,), and friction, shape (m, 2)."""
-    found = _solved(here, coefficient, None)
+    n, m = len(here.q_springs), len(here.normal)
+    found = _solved(here, coefficient, ByMotors(np.zeros((n, 0)), np.zeros((m, 0)), np.zeros((m, 2, 0))))
     return None if found is None else (found[0][:, 0], found[1][:, 0], found[2][:, :, 0])
 
 
@@ -36,10 +37,10 @@ def followed(here: Balance, coefficient: float, by_motors: ByMotors) -> tuple[Fl
     return None if found is None else (found[0][:, 0], found[0][:, 1:])
 
 
-def _solved(here: Balance, coefficient: float, by_motors: ByMotors | None) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+def _solved(here: Balance, coefficient: float, by_motors: ByMotors) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Changes of coordinates, normal forces and friction: Newton's in the first column, then one for each actuator."""
     near, laws, n, root = here.contacts, here.laws, len(here.q_springs), here.laws.root
-    count = 1 if by_motors is None else 1 + by_motors.load.shape[1]
+    count = 1 + by_motors.load.shape[1]
     by_normal, by_friction = np.zeros((len(here.normal), count)), np.zeros((*here.friction.shape, count))
     by_normal[:, 0], by_friction[:, :, 0] = -here.normal, -here.friction  # those that do not press lose their forces
     pressed, rubs = np.flatnonzero(laws.pressed), np.flatnonzero(laws.slips | laws.sticks)
@@ -55,16 +56,13 @@ def _solved(here: Balance, coefficient: float, by_motors: ByMotors | None) -> tu
     matrix[:n, place], matrix[place, :n] = -gradients.T, gradients
     right[place, 0] = -near.gaps[pressed] * laws.unit_normal[pressed]
     matrix[:n, places.ravel()] = -jacobian.reshape(-1, n).T
-    if by_motors is not None:
-        right[:n, 1:] = by_motors.load / root[:, None]
-        right[place, 1:] = -by_motors.gaps[pressed] * laws.unit_normal[pressed, None]
+    right[:n, 1:] = by_motors.load / root[:, None]
+    right[place, 1:] = -by_motors.gaps[pressed] * laws.unit_normal[pressed, None]
     for one, rows, moves in zip(rubs.tolist(), places, jacobian, strict=True):
-        slid = None if by_motors is None else -by_motors.sliding[one] * laws.unit_friction[one]
+        slid = -by_motors.sliding[one] * laws.unit_friction[one]
         if laws.sticks[one]:
             matrix[rows, :n] = moves
-            right[rows, 0] = -near.sliding[one] * laws.unit_friction[one]
-            if slid is not None:
-                right[rows, 1:] = slid
+            right[rows, 0], right[rows, 1:] = -near.sliding[one] * laws.unit_friction[one], slid
             continue
         # d lambda_t = mu way d lambda_n + held (1 - way way^T) (d lambda_t - rho d s)
         way, ratio = laws.way[one], laws.unit_normal[one] / laws.unit_friction[one]
@@ -72,9 +70,7 @@ def _solved(here: Balance, coefficient: float, by_motors: ByMotors | None) -> tu
         matrix[np.ix_(rows, rows)] = np.eye(2) - turn
         matrix[rows, :n] = turn @ moves
         matrix[rows, place[np.searchsorted(pressed, one)]] = -coefficient * ratio * way
-        right[rows, 0] = -laws.broken[one] / laws.unit_friction[one]
-        if slid is not None:
-            right[rows, 1:] = turn @ slid
+        right[rows, 0], right[rows, 1:] = -laws.broken[one] / laws.unit_friction[one], turn @ slid
     matrix[place] *= _FIRST
     right[place] *= _FIRST
     try:

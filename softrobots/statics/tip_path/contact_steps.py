@@ -32,7 +32,7 @@ from softrobots.statics.contact.quasi_static import FAR, Rest, at_rest, change, 
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_goal import Goal
-from softrobots.statics.tip_search import LEVER, SAME, WARM_DAMPING, LocalSolution, advance, search, tip_models
+from softrobots.statics.tip_search import SAME, WARM_DAMPING, LocalSolution, advance, search, tip_models
 from softrobots.statics.tip_steps import TipModel
 
 _MOST_TURNS = 100  # small steps of the motors before one of the tip
@@ -77,10 +77,7 @@ class RubbingTip:
 
     def missing(self, state: Rest) -> FloatArray:
         """Return the difference from the tip to the goal, shape (3 or 6,), rotations times the lever [m]."""
-        translation, turn = self.goal.missing(self.model, state.robot.at.q)
-        if self.goal.rotation is None:
-            return translation
-        return np.concatenate([translation, LEVER * self.model.reach * turn])
+        return self.goal.difference(self.model, state.robot.at.q)
 
     def motion(self, state: Rest) -> tuple[FloatArray, FloatArray]:
         """Return the derivatives of tip and elastic coordinates by the actuators in the step."""
