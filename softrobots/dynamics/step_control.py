@@ -131,7 +131,7 @@ def rule_of_order(order: int) -> type[MidpointRule]:
     return GaussRule if order == GaussRule.order else MidpointRule
 
 
-def error_share(before: float, now: float, order: int = 2) -> float:
+def error_share(before: float, now: float, order: int) -> float:
     """Error that is stated of the finer of two runs over the distance of their tips, `SAFETY / (r - 1)`; see the module.
 
     Args:

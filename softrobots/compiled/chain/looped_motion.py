@@ -33,7 +33,6 @@ from softrobots.compiled.chain.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.complex_numbers import ComplexScalar, of_parts, parts_of
 from softrobots.compiled.trace.expressions import Expression, Scalar
-from softrobots.dynamics.gauss import GaussRule
 
 
 @dataclass(frozen=True)
@@ -148,7 +147,7 @@ def _trace_kind(
     back.store_all(places.wrench, total.tolist())
     gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
     blocks, layout = [out, factor, back, step, place], plan.layout
-    if layout.order == GaussRule.order:
+    if layout.in_stages:
         back.store_all(layout.forces + layout.unknowns, gradient, "q")
         back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at both stages.", names, out.trace)
         blocks.append(back)
@@ -158,7 +157,7 @@ def _trace_kind(
     _store(back, places.sums, sums, places)
     kept = record.keep(back, vector(reduced)).tolist()
     steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6, places))
-    stages = corrections(steps) if layout.order == GaussRule.order else (steps.tolist(),)
+    stages = corrections(steps) if layout.in_stages else (steps.tolist(),)
     for stage, one in enumerate(stages):
         step.store_all(layout.correction + stage * layout.unknowns, one, "q")
     _store(step, places.answer, answer, places)

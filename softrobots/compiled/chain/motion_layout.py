@@ -96,9 +96,14 @@ class MotionLayout:
     prepared: int = field(init=False)
     """Values that do not depend on the unknowns, factors, records: as many places as the code needs."""
 
+    @property
+    def in_stages(self) -> bool:
+        """Whether a step has two stages."""
+        return self.order == GaussRule.order
+
     def __post_init__(self) -> None:
         """Compute the places."""
-        m, n, k = self.motors, self.unknowns, 2 if self.order == GaussRule.order else 1
+        m, n, k = self.motors, self.unknowns, 2 if self.in_stages else 1
         damping = n * n if self.full_damping else n
         given = dict(motor_velocities=m, motor_accelerations=m, force=3, gravity=3, damping=damping)
         middle = dict(time_step=1, unknown=n, rate=n, acceleration=n, correction=k * n, tip=3)
@@ -111,7 +116,7 @@ class MotionLayout:
 
     def constants(self) -> dict[str, int]:
         """Return the places by their names in generated code."""
-        left_out = _COUNTS if self.order == GaussRule.order else _COUNTS + _OF_STAGES
+        left_out = _COUNTS if self.in_stages else _COUNTS + _OF_STAGES
         places = {name.upper(): place for name, place in vars(self).items() if name not in left_out}
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
 
@@ -135,7 +140,7 @@ class MotionPlan:
     def factors(self, block: Block) -> tuple[Scalar, Scalar]:
         """Return the factors of damping and stiffness in the matrix of a step: `h/2` and `h^2/4`, or complex ones."""
         h = block.load(self.layout.time_step)
-        if self.order != GaussRule.order:
+        if not self.layout.in_stages:
             return h * 0.5, h * h * 0.25
         once, twice = EIGENVALUE, EIGENVALUE * EIGENVALUE
         return ComplexScalar(h * once.real, h * once.imag), ComplexScalar(h * h * twice.real, h * h * twice.imag)

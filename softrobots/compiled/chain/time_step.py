@@ -15,12 +15,11 @@ from softrobots.compiled.chain.motion_layout import MotionLayout
 from softrobots.compiled.motion_settings import KEPT_STEPS, MOTION_ROUNDING, MOTION_TOLERANCE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
-from softrobots.dynamics.gauss import GaussRule
 
 
 def step_blocks(layout: MotionLayout) -> list[Block]:
     """Return the functions of an unknown `i`, that of a motor `i`, and the test of convergence."""
-    guess, apply, finish = gauss_blocks(layout) if layout.order == GaussRule.order else _midpoint_blocks(layout)
+    guess, apply, finish = gauss_blocks(layout) if layout.in_stages else _midpoint_blocks(layout)
     return [
         guess,
         apply,

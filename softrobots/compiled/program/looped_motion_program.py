@@ -17,7 +17,6 @@ from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_parts import MotionParts
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import cosine, sine
-from softrobots.dynamics.gauss import GaussRule
 
 _PASSES = {
     "move": "Outward pass: motion of the bodies.",
@@ -29,46 +28,20 @@ _PASSES = {
 _REDUCE = "Inward pass: elimination of the torques at both stages."
 _INWARD = ("articulate", "resist", "reduce")
 
-_CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
-    """Evaluate and factor; write the correction."""
-    start_move_SUFFIX(w)
+_MOVE = """    start_move_SUFFIX(w)
     for i in range(N):
         bend_SUFFIX(w, i)
     move_all_SUFFIX(w)
-    start_articulate_SUFFIX(w)
+"""
+_ARTICULATE = """    start_articulate_SUFFIX(w)
     articulate_all_SUFFIX(w)
-    start_resist_SUFFIX(w)
+"""
+_RESIST = """    start_resist_SUFFIX(w)
     resist_all_SUFFIX(w)
-    correct_all_SUFFIX(w)
-
-
-def motion_correct_SUFFIX(w: Array) -> None:
-    """Evaluate; write the correction with the factors that are there."""
-    start_move_SUFFIX(w)
-    for i in range(N):
-        bend_SUFFIX(w, i)
-    move_all_SUFFIX(w)
-    start_resist_SUFFIX(w)
-    resist_all_SUFFIX(w)
-    correct_all_SUFFIX(w)
-
-
-def motion_tip_SUFFIX(w: Array) -> None:
-    """Write the tip at motors and unknowns."""
-    start_place_SUFFIX(w)
-    place_all_SUFFIX(w)
-    finish_place_SUFFIX(w)'''
-
-
-_STAGES_CONTROL = '''def resist_stage_SUFFIX(w: Array) -> None:
+"""
+_AT_STAGES = f'''def resist_stage_SUFFIX(w: Array) -> None:
     """Evaluate the stage that is placed."""
-    start_move_SUFFIX(w)
-    for i in range(N):
-        bend_SUFFIX(w, i)
-    move_all_SUFFIX(w)
-    start_resist_SUFFIX(w)
-    resist_all_SUFFIX(w)
-
+{_MOVE}{_RESIST}
 
 def resist_stages_SUFFIX(w: Array) -> None:
     """Evaluate both stages."""
@@ -80,31 +53,36 @@ def resist_stages_SUFFIX(w: Array) -> None:
     resist_stage_SUFFIX(w)
 
 
-def motion_factor_SUFFIX(w: Array) -> None:
+'''
+_CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
     """Evaluate and factor; write the correction."""
-    resist_stages_SUFFIX(w)
-    start_articulate_SUFFIX(w)
-    articulate_all_SUFFIX(w)
-    reduce_all_SUFFIX(w)
-    correct_all_SUFFIX(w)
+FACTOR    correct_all_SUFFIX(w)
 
 
 def motion_correct_SUFFIX(w: Array) -> None:
     """Evaluate; write the correction with the factors that are there."""
-    resist_stages_SUFFIX(w)
-    reduce_all_SUFFIX(w)
-    correct_all_SUFFIX(w)
+CORRECT    correct_all_SUFFIX(w)
 
 
-'''
+def motion_tip_SUFFIX(w: Array) -> None:
+    """Write the tip at motors and unknowns."""
+    start_place_SUFFIX(w)
+    place_all_SUFFIX(w)
+    finish_place_SUFFIX(w)'''
+
+
+def _control(in_stages: bool) -> str:
+    """Text of the functions that call the passes."""
+    evaluate, reduce = ("    resist_stages_SUFFIX(w)\n", "    reduce_all_SUFFIX(w)\n") if in_stages else (_MOVE, _RESIST)
+    text = _CONTROL.replace("FACTOR", evaluate + _ARTICULATE + reduce).replace("CORRECT", evaluate + reduce)
+    return _AT_STAGES + text if in_stages else text
 
 
 def looped_motion(plan: MotionPlan) -> MotionParts:
     """Trace the functions of a looped chain."""
     unknowns, layout = plan.unknowns, plan.layout
-    in_stages = layout.order == GaussRule.order
+    in_stages = layout.in_stages
     passes = _PASSES | ({"reduce": _REDUCE} if in_stages else {})
-    control = _STAGES_CONTROL + _CONTROL[_CONTROL.index("def motion_tip") :] if in_stages else _CONTROL
     places = GroupLayout(layout.prepared, layout.unknowns, 2 if in_stages else 1)
     kinds = group_kinds(plan, places)
     record, sequence = places.end, {}
@@ -134,7 +112,7 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     loops, lane_loops = (
         [
             *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
-            control.replace("_SUFFIX", suffix),
+            _control(in_stages).replace("_SUFFIX", suffix),
         ]
         for suffix in ("", "_lanes")
     )

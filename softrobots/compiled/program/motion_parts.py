@@ -19,7 +19,6 @@ from softrobots.compiled.chain.unrolled_motion import (
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.complex_numbers import of_parts, parts_of
 from softrobots.compiled.trace.expressions import Scalar
-from softrobots.dynamics.gauss import GaussRule
 
 
 @dataclass(frozen=True)
@@ -48,7 +47,7 @@ def unrolled_motion(plan: MotionPlan) -> MotionParts:
     layout, n = plan.layout, plan.layout.unknowns
     prepare = Block("motion_prepare", "Compute what depends on motors, force, gravity and time step only.")
     factor = Block("motion_factor", "Evaluate and factor; write the correction.", trace=prepare.trace)
-    in_stages = layout.order == GaussRule.order
+    in_stages = layout.in_stages
     states = [_stage_state(plan, factor, stage) for stage in range(2)] if in_stages else [state_of(plan, factor)]
     joints = [joints_of(plan, factor, state) for state in states]
     inverses, lower = factored(newton_matrix(plan, factor, joints[-1]))

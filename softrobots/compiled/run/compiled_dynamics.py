@@ -156,7 +156,6 @@ class CompiledDynamics(CompiledStatics):
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
             mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
-
             order: Order of the error in the length of the step: 2, or 4 for motors that stand still.
 
         Returns:

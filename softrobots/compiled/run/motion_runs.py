@@ -186,18 +186,19 @@ def replay(
     """
     m, k, count = equations.n_motors, equations.n - equations.n_motors, 2 * len(taken.grid) - 1
     motors, states = np.broadcast_to(motors_of_steps(course.path, taken.grid), (count, m)), taken.rows[0]
-    begin = State(0.0, np.concatenate([motors[0], states[0, :k]]), np.concatenate([np.zeros(m), states[0, k : 2 * k]]))
-    recorder = Recorder(rule_of_order(order)(equations, course.path, course.load), begin, rows)
+
+    def still(time: float, row: int) -> State:
+        """The state of a row whose motors stand still."""
+        x, rates = np.split(states[row, : 2 * k], 2)
+        return State(time, np.concatenate([motors[0], x]), np.concatenate([np.zeros(m), rates]))
+
+    recorder = Recorder(rule_of_order(order)(equations, course.path, course.load), still(0.0, 0), rows)
     for step, end in enumerate(taken.grid[1:].tolist()):
         before = recorder.state
         if order == GaussRule.order:
             again = recorder.rule.step(before, end)
             if again is not None:
-                reached = (
-                    np.concatenate([motors[0], states[step + 1, :k]]),
-                    np.concatenate([np.zeros(m), states[step + 1, k : 2 * k]]),
-                )
-                recorder.add(again._replace(end=State(end, *reached)))
+                recorder.add(again._replace(end=still(end, step + 1)))
             continue
         h, middle_time = end - before.time, 0.5 * (before.time + end)
         u0, middle, u1 = motors[2 * step : 2 * step + 3]
