@@ -100,7 +100,7 @@ class MujocoMotion:
                         break
                     if found and seconds > 4.0 * min(found)[0]:
                         break
-                    per_row = max(per_row + 1, round(per_row * 1.5))
+                    per_row = max(per_row + 1, round(per_row * 1.1))
         finally:
             self._mujoco.set_mju_user_warning(before)
         if not found:
