@@ -110,6 +110,17 @@ def test_a_picture_is_readable_at_400_pixels_and_shown_by_notebooks() -> None:
         assert box.x1 <= figure.bbox.x1
 
 
+def test_a_robot_given_as_parameters_is_drawn_at_rest_and_summarised() -> None:
+    robot = sr.InflatableArm()
+    tip = (sum(robot.link_lengths), 0.0, 0.0)
+    assert any(np.allclose(points[-1], tip, rtol=0.0, atol=1e-9) for points in ends_of(sr.plot(robot).axes[0]))
+    assert "stiffness" in robot.summary()
+    assert "0.6  0.6 m" in robot.summary()
+    assert "<svg" in robot._repr_html_()
+    with pytest.raises(sr.ParameterError, match="a robot, a SoftModel"):
+        sr.plot(sr.InflatableArm)
+
+
 @pytest.mark.study
 def test_models_solutions_and_movements_are_drawn() -> None:
     (axes,) = sr.plot(ARM).axes

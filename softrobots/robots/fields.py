@@ -17,7 +17,7 @@ from typing import Any, ClassVar, Literal, TypeVar
 import numpy as np
 
 from softrobots.core.errors import FieldNotFound, ParameterError
-from softrobots.core.field_help import FieldHelp
+from softrobots.core.summary import Part, Summarised, facts, field_facts
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
 from softrobots.robots.field_values import checked_value, numbers, within
@@ -171,7 +171,7 @@ class _FieldsAsArguments:
 
 
 @dataclass(frozen=True, kw_only=True)
-class XacroRobot(FieldHelp):
+class XacroRobot(Summarised):
     """Base of a frozen dataclass whose fields (`parameter`) are the arguments of a xacro file."""
 
     XACRO: ClassVar[str | Path]
@@ -193,14 +193,18 @@ class XacroRobot(FieldHelp):
         """Number of movable joints of the chain; above 300 Pinocchio's workspace is refused."""
         raise NotImplementedError
 
+    def summary_parts(self) -> list[Part]:
+        """Return the fields with their units."""
+        return [facts(field_facts(self, *facts_of(self)))]
+
     def xacro_arguments(self) -> dict[str, str]:
         """Return the parameters as arguments of the xacro file: text by name, full precision."""
         arguments = {}
-        for name, facts in facts_of(self).items():
+        for name, known in facts_of(self).items():
             value = getattr(self, name)
-            if facts.form == "colour":
+            if known.form == "colour":
                 arguments[name] = ",".join(" ".join(map(repr, colour)) for colour in value)
-            elif facts.in_xacro:
+            elif known.in_xacro:
                 arguments[name] = argument_text(value)
         return arguments
 

@@ -190,10 +190,10 @@ def growing_helix_tube() -> Viewer:
 
 def actuated_helix_tube() -> Viewer:
     """A tube that is straight at rest, under 10 kPa, which its actuator bends into a helix."""
-    tube = HelixTube(actuator="elastic", length=1.1, elastic_sections=18, bending_stiffness=1e-3)
+    tube = HelixTube(actuator="elastic", length=0.75, elastic_sections=12, bending_stiffness=1e-3)
     model = load_model(tube)
     viewer = view(model, solve_equilibrium(model, tube.q_motors))
-    viewer.look_from((0.44, 0.11, 0.19), (0.07, 0.16, 0.07))
+    viewer.look_from((0.7, -0.02, 0.53), (0.05, 0.08, 0.34))
     return viewer
 
 

@@ -17,8 +17,14 @@ MOST = 20.0
 """End of the histogram [mm]."""
 FLOOR = "the robot against itself"
 TITLES = {"train": "train: one and two segments", "val": "validation: three segments"}
-SHOWN = {"train": ("rep1_seg1_circle", "rep1_pair13_opp_dir60"), "val": ("rep1_all3_same_dir60", "rep1_all3_spiral_dir120")}
-"""Movements whose paths are drawn."""
+SHOWN = {
+    "train": {"rep1_seg1_circle": "segment 1, circle", "rep1_pair13_opp_dir60": "segments 1 and 3, opposite ways, 60\u00b0"},
+    "val": {
+        "rep1_all3_same_dir60": "three segments, same way, 60\u00b0",
+        "rep1_all3_spiral_dir120": "three segments, spiral, 120\u00b0",
+    },
+}
+"""Movements whose paths are drawn, and their titles."""
 
 
 def pictures(compared: Sequence[Compared], plain: Sequence[Compared], floor: FloatArray) -> dict[str, Any]:
@@ -170,7 +176,8 @@ def paths(compared: Sequence[Compared]) -> Any:
             axes.plot(*path[0], color=canvas.COLOURS[place], marker="*", ms=12, ls="none", label=f"start, {name}")
         beside.plot(MM * one.errors[chosen], color="black", lw=1.2, marker="o", ms=3)
         axes.set(xlabel="x [mm]", ylabel="y [mm]")
-        axes.set_title(f"{block}\n({one.recording.name})", fontsize=canvas.SMALL)
+        title = SHOWN[one.recording.name][block]
+        axes.set_title(f"{title}\n({TITLES[one.recording.name].partition(':')[0]})", fontsize=canvas.SMALL)
         axes.set_aspect("equal", adjustable="datalim")
         beside.set(xlabel="row of the movement", ylabel="tip error [mm]", ylim=(0.0, None))
         axes.grid(alpha=0.3)

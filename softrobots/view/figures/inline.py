@@ -9,9 +9,10 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
+from softrobots.robots.fields import XacroRobot
 from softrobots.view.appearance import LINE_COLOUR, TUBE_COLOUR, rgb, shared_scale
 from softrobots.view.figures.canvas import CONTACT, FORCE, GREY, INK
-from softrobots.view.figures.pose import DrawnPose, Posed, model_of
+from softrobots.view.figures.pose import DrawnPose, Posed, model_of, with_robot_loaded
 from softrobots.view.tension_scale import round_down, tension_colour
 
 _WIDE, _HIGH, _EDGE = 340.0, 240.0, 14.0  # [px]
@@ -19,15 +20,14 @@ _DARKER = 0.7  # of a colour: that of an edge
 _MOST_POINTS = 80  # of a line
 
 
-def inline_picture(result: Posed) -> str:
+def inline_picture(result: Posed | XacroRobot) -> str:
     """Return a picture of a result as an SVG element: the robot in parallel projection, with a scale and a description.
 
     It is empty for a robot with meshes, which take longer to read than a cell should take, and for one that cannot be drawn.
     """
-    if "<mesh" in model_of(result).urdf:
-        return ""
     try:
-        return _svg(DrawnPose.of(result))
+        posed = with_robot_loaded(result)
+        return "" if "<mesh" in model_of(posed).urdf else _svg(DrawnPose.of(posed))
     except SoftRobotsError:  # the table beside it says what there is
         return ""
 

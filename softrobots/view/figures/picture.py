@@ -15,6 +15,7 @@ from softrobots.dynamics.vibration import VibrationModes
 from softrobots.identification.cross_validation import CrossValidation
 from softrobots.identification.identification import Identification
 from softrobots.identification.informative_poses import InformativePoses
+from softrobots.robots.fields import XacroRobot
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
 from softrobots.statics.workspace import Workspace
 from softrobots.statics.workspace_map import WorkspaceMap
@@ -24,7 +25,7 @@ from softrobots.view.figures.equilibria import branches
 from softrobots.view.figures.experiments import cross_validation, informative
 from softrobots.view.figures.identifications import predicted
 from softrobots.view.figures.inline import inline_picture
-from softrobots.view.figures.pose import DrawnPose, Posed
+from softrobots.view.figures.pose import DrawnPose, Posed, with_robot_loaded
 from softrobots.view.figures.vibrations import mode_shapes
 from softrobots.view.figures.workspaces import workspace, workspace_maps
 from softrobots.view.legend import LegendEntry, legend
@@ -42,7 +43,7 @@ FIGURES: dict[type, Callable[[Any], Any]] = {
 }
 """The figure of each kind of results that no pose stands for, by its class; of branches there are several, in a tuple."""
 
-PICTURES.update(dict.fromkeys(get_args(Posed), inline_picture))
+PICTURES.update(dict.fromkeys((XacroRobot, *get_args(Posed)), inline_picture))
 
 _WIDE, _TALL = 6.4, 5.2  # [in], of the picture without title and legend
 _LIGHT = np.array([-0.36, -0.48, 0.8])  # unit vector towards it
@@ -55,18 +56,19 @@ def plot(result: Any, *, title: str | None = None) -> Any:
     """Draw a result: the robot in its pose, or the figure of results that are no pose.
 
     The robot is drawn with its body, actuators, forces, obstacles and contacts, in metres with equal scales: an equilibrium
-    beside the robot with relaxed springs and the same motors (grey), a model at rest, a solution of the inverse kinematics with
-    its target. A trajectory, path in contact or motion is drawn at its end, with the path of the tip, and the robot at the
-    beginning in grey. The legend tells forces in newtons and the position of the tip. Colours are those of `softrobots.view`.
+    beside the robot with relaxed springs and the same motors (grey), a robot or model at rest, a solution of the inverse
+    kinematics with its target. A trajectory, path in contact or motion is drawn at its end, with the path of the tip, and the
+    robot at the beginning in grey. The legend tells forces in newtons and the position of the tip. Colours are those of
+    `softrobots.view`.
 
     Modes are drawn as their swings, a workspace as its points, a workspace map as its areas, branches over the force, a fit as
     what it predicts over what was measured, a cross-validation and a choice of poses as their errors. `softrobots.view.figures`
     has more, with options. As the last expression of a cell of a notebook the figure is shown there.
 
     Args:
-        result: An equilibrium or what holds one (`IkSolution`, `ImposedDisplacement`, `LoadEstimate`), a model, a `Trajectory`,
-            a `ContactPath` or a `Motion`; `VibrationModes`, a `Workspace` or `WorkspaceMap`, an `EquilibriumBranch` or several,
-            an `Identification`, a `CrossValidation` or `InformativePoses`.
+        result: An equilibrium or what holds one (`IkSolution`, `ImposedDisplacement`, `LoadEstimate`), a robot, a model, a
+            `Trajectory`, a `ContactPath` or a `Motion`; `VibrationModes`, a `Workspace` or `WorkspaceMap`, an
+            `EquilibriumBranch` or several, an `Identification`, a `CrossValidation` or `InformativePoses`.
         title: Title of the figure; of a pose the name of the robot by default.
 
     Returns:
@@ -76,13 +78,15 @@ def plot(result: Any, *, title: str | None = None) -> Any:
         ParameterError: If it is something else, or has nothing to draw.
         MissingDependency: If matplotlib is not installed.
         ViewerError: If a shape of the robot cannot be read or drawn.
+        DescriptionError: If a robot cannot be loaded.
     """
+    result = with_robot_loaded(result)
     if isinstance(result, Posed):
         return _robot(DrawnPose.of(result), title)
     several = isinstance(result, tuple | list) and result and all(isinstance(one, EquilibriumBranch) for one in result)
     draw = branches if several else next((draw for kind, draw in FIGURES.items() if isinstance(result, kind)), None)
     if draw is None:
-        kinds = "an Equilibrium or what holds one, a SoftModel, a Trajectory, a ContactPath, a Motion"
+        kinds = "an Equilibrium or what holds one, a robot, a SoftModel, a Trajectory, a ContactPath, a Motion"
         names = ", ".join(kind.__name__ for kind in FIGURES)
         raise ParameterError("result", result, f"{kinds}, or one of {names}; softrobots.view.figures draws others")
     figure = draw(result)

@@ -9,6 +9,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.motion import Motion
+from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_path import ContactPath
 from softrobots.statics.equilibrium import Equilibrium
@@ -130,3 +131,12 @@ def model_of(result: Posed) -> SoftModel:
     if isinstance(result, IkSolution | ImposedDisplacement | LoadEstimate):
         return result.equilibrium.model
     return result if isinstance(result, SoftModel) else result.model
+
+
+def with_robot_loaded(result: Any) -> Any:
+    """Return the model of a robot that is given as parameters; any other result as it came.
+
+    Raises:
+        DescriptionError: If the robot cannot be loaded.
+    """
+    return load_model(result) if callable(getattr(result, "urdf", None)) and not isinstance(result, type) else result
