@@ -377,7 +377,7 @@ def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
     ).equilibria
     assert {contact.status for contact in rubs.contacts} <= {"sticks", "slips"}
     for call in (sr.compliance, sr.elastostatic_jacobian, sr.contact_sensitivity, sr.vibration_modes):
-        with pytest.raises(sr.ParameterError, match="one whose contacts have no friction"):
+        with pytest.raises(sr.ParameterError, match="one whose contacts stick, or have no friction"):
             call(found.model, rubs)
     with pytest.raises(sr.ParameterError, match="a ContactPath is saved with its friction"):
         sr.save_result(rubs, tmp_path / "rubs.npz")

@@ -18,13 +18,16 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, one_each
-from softrobots.core.errors import DescriptionError
+from softrobots.core.errors import DescriptionError, NeutralEquilibrium, ParameterError
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.contact.pressed_gaps import pressed_gaps, state_in_contact, whole_stiffness
+from softrobots.model.springs import POSITIVE
+from softrobots.statics.contact.held import held_stiffness
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import frame_jacobian
+
+_UNSYMMETRIC = 1e-3  # largest unsymmetric part of a stiffness with modes, over the least stiffness
 
 
 class SmallMotion(NamedTuple):
@@ -45,7 +48,7 @@ class SmallMotion(NamedTuple):
     momentum: FloatArray
     """Momentum, and angular momentum about the world's origin, by rates of the coordinates, shape (6, n) [kg m, kg m^2]."""
     pressed: FloatArray | None = None
-    """Derivatives of the gaps that stay closed by the coordinates, shape (k, n); None if nothing is pressed."""
+    """Derivatives of what contacts hold by the coordinates, `PressedGaps`, shape (k, n); None if nothing is pressed."""
 
 
 def small_motion(
@@ -61,7 +64,7 @@ def small_motion(
         rotor_inertia: Inertia of the rotor of each placed actuator, or one for all [kg m^2 or kg]; None: of the file.
 
     Raises:
-        ParameterError: If a number is negative or not finite, a shape differs, or contacts have friction.
+        ParameterError: If a number is negative or not finite, a shape differs, or a contact slips.
         DescriptionError: If the robot has more joints than Pinocchio supports.
     """
     m, placed, drives = model.n_motors, model.actuators.n_placed, model.actuators.drives
@@ -75,8 +78,7 @@ def small_motion(
     if load.environment is None:
         stiffness = equations.stiffness(x, load.wrenches)
     else:
-        state = state_in_contact(equilibrium, "a vibration")
-        stiffness, pressed = whole_stiffness(state, load), pressed_gaps(state)
+        stiffness, pressed = held_stiffness(equilibrium, "a vibration")
     damping = equations.damping.copy()
     damping[m:, m:] = damping_matrix(model, damping_time, mass_damping, whole[m:, m:])
     kept = np.r_[:placed, m : len(x)]
@@ -106,6 +108,25 @@ def mass_factor(model: SoftModel, mass: FloatArray) -> FloatArray:
         return np.asarray(np.linalg.cholesky(mass))
     except np.linalg.LinAlgError:
         raise DescriptionError(f"a coordinate of {model.pinocchio.name} moves no mass; give its links mass") from None
+
+
+def check_vibrates(relative: FloatArray) -> None:
+    """Check that a stiffness has modes, in coordinates in which springs and servos have stiffness 1.
+
+    Raises:
+        ParameterError: If its symmetric part is not positive, or the rest is more than 1e-3 of the least stiffness.
+        NeutralEquilibrium: If it is singular.
+    """
+    softest = float(np.linalg.eigvalsh(0.5 * (relative + relative.T)).min(initial=1.0))
+    if softest <= -POSITIVE:
+        required = "positive, relative to springs and servos: about an unstable one nothing vibrates (linearize takes it)"
+        raise ParameterError("least stiffness of the equilibrium", float(f"{softest:.3g}"), required)
+    if softest <= POSITIVE:
+        raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has a mode without frequency")
+    rest = 0.5 * float(np.linalg.norm(relative - relative.T)) / softest
+    if rest > _UNSYMMETRIC:
+        required = f"at most {_UNSYMMETRIC:g}: where contacts roll and spin under much friction modes are not orthogonal"
+        raise ParameterError("unsymmetric part of the stiffness over the least", float(f"{rest:.3g}"), required)
 
 
 def _momentum(model: SoftModel, q: FloatArray) -> FloatArray:

@@ -12,8 +12,10 @@ d_{ii} / 2 \omega_i`. That is exact if damping does not couple the modes (a `dam
 and wrong by terms of second order in the coupling otherwise (Rayleigh, The Theory of Sound, 1894, section 102);
 `VibrationModes.eigenvalues` are exact for any damping.
 
-In contact the robot vibrates along its obstacles, without friction: `K` is the Hessian of the Lagrangian, and the modes are
-those of :math:`Z^T K Z` and :math:`Z^T M Z`, with a basis `Z` of the motions that keep the pressed gaps closed.
+In contact the robot vibrates along its obstacles where there is no friction, and about the points that stick: `K` is the
+Hessian of the Lagrangian, and the modes are those of :math:`Z^T K Z` and :math:`Z^T M Z`, with a basis `Z` of the motions that
+contacts leave. What sticks may roll and spin at once, which makes `K` slightly unsymmetric (`softrobots.statics.contact.held`);
+modes are those of its symmetric part, wrong by the square of the rest, or refused where that is above 1e-3.
 """
 
 from __future__ import annotations
@@ -27,12 +29,11 @@ import numpy as np
 
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, one_each, positive_integer, positive_number, read_only
-from softrobots.core.errors import NeutralEquilibrium, ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.core.summary import Part, Summarised
-from softrobots.dynamics.small_motion import mass_factor, small_motion
+from softrobots.dynamics.small_motion import check_vibrates, mass_factor, small_motion
 from softrobots.dynamics.vibration_summary import modes_parts
 from softrobots.model.soft_model import SoftModel
-from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
@@ -54,7 +55,7 @@ class VibrationModes(Summarised):
     equilibrium: Equilibrium
     """The equilibrium."""
     frequencies: FloatArray
-    """Natural frequencies without damping, ascending, shape (n,) [Hz]; one less for each pressed contact."""
+    """Natural frequencies without damping, ascending, shape (n,) [Hz]; one less for each pressed contact, three if stuck."""
     shapes: FloatArray
     r"""Elastic coordinates of each mode per modal coordinate, a column a mode, mass-normalised, shape (n_springs, n)
     [rad/(sqrt(kg) m) or 1/sqrt(kg)]."""
@@ -182,7 +183,7 @@ def vibration_modes(
 
     Stiffness is the exact tangent with load and gravity, and the mass matrix that of the bent shape. The load does not change
     while the robot vibrates. In contact, pressed contacts stay pressed and slide without friction, so that there are as many
-    modes less; where the robot touches without a force, nothing holds it.
+    modes less, or stick (`follow_contact`) and hold all three directions; where it touches without a force, nothing holds it.
 
     Args:
         model: The robot.
@@ -200,8 +201,8 @@ def vibration_modes(
 
     Raises:
         ParameterError: If an argument is out of range, the equilibrium belongs to another model, its load has a moment (under
-            which modes are not orthogonal; `linearize` takes it), its contacts have friction, or it is unstable, with its
-            servos.
+            which modes are not orthogonal; `linearize` takes it), a contact slips or rolls and spins under much friction,
+            or it is unstable, with its servos.
         NeutralEquilibrium: If the stiffness is singular.
         DescriptionError: If the description has no masses, or the robot more joints than Pinocchio supports.
     """
@@ -224,15 +225,15 @@ def vibration_modes(
     tip, mass, damping = small.tip[:, first:], small.mass[first:, first:], small.damping[first:, first:]
     with one_blas_thread(len(mass)):
         stiffness = (small.stiffness + np.diag(np.concatenate([servos, np.zeros(model.n_springs)])))[first:, first:]
-        stiffness = 0.5 * (stiffness + stiffness.T)
+        whole, stiffness = stiffness, 0.5 * (stiffness + stiffness.T)
         own = np.concatenate([np.where(servos[first:] > 0.0, servos[first:], model.stiffest or 1.0), model.stiffness])
         if small.pressed is None:
-            _refuse_unstable(scaled(stiffness, own))
+            check_vibrates(scaled(stiffness, own))
             frequencies, modes = _modes(stiffness, mass, model)
-        else:  # only motions that keep the gaps closed
+        else:  # only motions that contacts leave
             soft = 1.0 / np.sqrt(own)
             free = soft[:, None] * null_space(small.pressed[:, first:] * soft)
-            _refuse_unstable(free.T @ stiffness @ free)
+            check_vibrates(free.T @ whole @ free)
             frequencies, modes = _modes(free.T @ stiffness @ free, free.T @ mass @ free, model)
             modes = free @ modes
         modes = _signed(model, tip, frequencies, modes)
@@ -257,16 +258,6 @@ def vibration_modes(
             "rotor_inertia": rotor_inertia,
         },
     )
-
-
-def _refuse_unstable(relative: FloatArray) -> None:
-    """Refuse a stiffness that is not positive definite, in coordinates in which springs and servos have stiffness 1."""
-    softest = float(np.linalg.eigvalsh(relative).min(initial=1.0))
-    if softest <= -POSITIVE:
-        required = "positive, relative to springs and servos: about an unstable one nothing vibrates (linearize takes it)"
-        raise ParameterError("least stiffness of the equilibrium", float(f"{softest:.3g}"), required)
-    if softest <= POSITIVE:
-        raise NeutralEquilibrium("the tangent stiffness is singular: a neutral equilibrium has a mode without frequency")
 
 
 def _modes(stiffness: FloatArray, mass: FloatArray, model: SoftModel) -> tuple[FloatArray, FloatArray]:

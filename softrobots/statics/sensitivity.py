@@ -1,6 +1,6 @@
 """First derivatives of a loaded equilibrium: elastostatic Jacobian and compliance.
 
-In contact they are those while every pressed contact stays pressed, without friction.
+In contact they are those while every pressed contact stays pressed, and every one that sticks sticks.
 """
 
 from __future__ import annotations
@@ -15,7 +15,8 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
-from softrobots.statics.contact.pressed_gaps import PressedGaps, pressed_gaps, state_in_contact
+from softrobots.statics.contact.held import held_contacts
+from softrobots.statics.contact.pressed_gaps import PressedGaps
 from softrobots.statics.elastic_state import scaled
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.kinematics import frame_jacobian
@@ -36,12 +37,13 @@ def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatAr
         Shape (3, n_motors) [m/rad or m/m], world axes.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model, or has contacts with friction.
+        ParameterError: If the equilibrium belongs to another model, or has a contact that slips.
         NeutralEquilibrium: If its tangent stiffness is singular, see `inverse_stiffness`.
     """
     check_same_model(model, equilibrium)
     motors, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
-    matrices = equilibrium.tangent_stiffness, equilibrium.coupling, _pressed(equilibrium)
+    pressed = held_contacts(equilibrium, "a derivative by motors", moves=True) if equilibrium.contacts else None
+    matrices = equilibrium.tangent_stiffness, equilibrium.coupling, pressed
     return tip_motion(model, motors[:3], springs[:3], *matrices)[0]
 
 
@@ -59,24 +61,18 @@ def compliance(model: SoftModel, equilibrium: Equilibrium) -> FloatArray:
         Shape (6, 6) [m/N, m/(N m); rad/N, rad/(N m)].
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model, or has contacts with friction.
+        ParameterError: If the equilibrium belongs to another model, or has a contact that slips.
         NeutralEquilibrium: If its tangent stiffness is singular, see `inverse_stiffness`.
     """
     check_same_model(model, equilibrium)
     _, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
-    tangent, pressed = equilibrium.tangent_stiffness, _pressed(equilibrium)
+    tangent = equilibrium.tangent_stiffness
+    pressed = held_contacts(equilibrium, "a compliance") if equilibrium.contacts else None
     if pressed is None:
         inverse = inverse_stiffness(model, tangent)
     else:
         inverse = inverse_in_contact(model, tangent, pressed.by_springs).springs_by_load
     return np.asarray(springs @ inverse @ springs.T)
-
-
-def _pressed(equilibrium: Equilibrium) -> PressedGaps | None:
-    """The pressed gaps of an equilibrium, or ParameterError if its contacts have friction."""
-    if not equilibrium.contacts:
-        return None
-    return pressed_gaps(state_in_contact(equilibrium, "a derivative"))
 
 
 def tip_columns(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray) -> tuple[FloatArray, FloatArray]:

@@ -53,6 +53,8 @@ class Contact:
     """Slip of the robot's point over the obstacle in this step, shape (3,) [m]; zero without friction."""
     with_itself: bool = False
     """Whether `obstacle` is a link of the robot itself."""
+    cone_share: float = 0.0
+    """Friction over the largest that the cone holds [-]: below 1 where it sticks, 1 where it slips, 0 without friction."""
 
     def __repr__(self) -> str:
         """Bodies, status, force and place in one line."""

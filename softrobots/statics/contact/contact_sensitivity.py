@@ -8,7 +8,7 @@ from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.summary import summarised
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact import Contact
-from softrobots.statics.contact.pressed_gaps import pressed_gaps, state_in_contact
+from softrobots.statics.contact.held import held_contacts
 from softrobots.statics.equilibrium_result import Equilibrium, check_same_model
 from softrobots.statics.sensitivity import inverse_in_contact, tip_columns
 
@@ -30,7 +30,7 @@ class ContactSensitivity(NamedTuple):
 
 
 def contact_sensitivity(model: SoftModel, equilibrium: Equilibrium) -> ContactSensitivity:
-    r"""Differentiate the contact forces of an equilibrium without friction by motors, loads and obstacles.
+    r"""Differentiate the contact forces of an equilibrium by motors, loads and obstacles.
 
     With the Hessian of the Lagrangian, the gradients `G` of the pressed gaps by springs and `G_m` by motors, the forces follow
     motors by :math:`d\lambda/dq_m = F C - S G_m` and obstacles that come nearer by `S`: blocks of the inverse of the bordered
@@ -44,20 +44,22 @@ def contact_sensitivity(model: SoftModel, equilibrium: Equilibrium) -> ContactSe
         The derivatives; with no rows where nothing is pressed.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model, or has contacts with friction.
+        ParameterError: If the equilibrium belongs to another model, or has a contact that slips.
         NeutralEquilibrium: If the stiffness beside the contacts is singular.
     """
     check_same_model(model, equilibrium)
-    pressed = pressed_gaps(state_in_contact(equilibrium, "a derivative"))
+    pressed = held_contacts(equilibrium, "a derivative of its forces", moves=True)
     gradients, by_motors = equilibrium.tangent_stiffness[:0], equilibrium.coupling[:0]
     if pressed is not None:
         gradients, by_motors, _ = pressed
     inverse = inverse_in_contact(model, equilibrium.tangent_stiffness, gradients)
     _, springs = tip_columns(model, equilibrium.q_motors, equilibrium.q_springs)
+    contacts = tuple(contact for contact in equilibrium.contacts if contact.strict)
+    k, motors = len(contacts), inverse.forces_by_load @ equilibrium.coupling - inverse.forces_by_gap @ by_motors
     return ContactSensitivity(
-        contacts=tuple(contact for contact in equilibrium.contacts if contact.strict),
-        by_motors=read_only(inverse.forces_by_load @ equilibrium.coupling - inverse.forces_by_gap @ by_motors),
-        by_wrench=read_only(inverse.forces_by_load @ springs.T),
-        by_approach=read_only(inverse.forces_by_gap),
-        springs_by_approach=read_only(inverse.springs_by_gap),
+        contacts=contacts,
+        by_motors=read_only(motors[:k]),
+        by_wrench=read_only((inverse.forces_by_load @ springs.T)[:k]),
+        by_approach=read_only(inverse.forces_by_gap[:k, :k]),
+        springs_by_approach=read_only(inverse.springs_by_gap[:, :k]),
     )

@@ -11,7 +11,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.statics.contact.certificate import active_contacts
 from softrobots.statics.contact.contact import SLIPS, STICKS
 from softrobots.statics.contact.touch import joined
-from softrobots.statics.elastic_state import TOLERANCE, ElasticState, elastic_state, largest_residual
+from softrobots.statics.elastic_state import TOLERANCE, ElasticState, largest_residual
 from softrobots.statics.loads import AppliedLoad, Load
 
 if TYPE_CHECKING:
@@ -19,14 +19,17 @@ if TYPE_CHECKING:
 
 
 class PressedGaps(NamedTuple):
-    """Gaps that stay zero, in the order of the pressed ones of `Equilibrium.contacts`."""
+    """Gaps that stay zero, in the order of the pressed ones of `Equilibrium.contacts`.
+
+    Where contacts stick, after them the two ways of sliding of each (`softrobots.statics.contact.held`).
+    """
 
     by_springs: FloatArray
     """Their derivatives by the springs, shape (k, n_springs)."""
     by_motors: FloatArray
     """Their derivatives by the actuators, shape (k, n_motors)."""
     forces: FloatArray
-    """Their normal forces, shape (k,) [N]."""
+    """Their forces, shape (k,) [N]."""
 
 
 def pressed_gaps(state: ElasticState) -> PressedGaps | None:
@@ -50,16 +53,6 @@ def check_no_rubbing(equilibrium: Equilibrium, what: str) -> None:
     rubbing = [contact.obstacle for contact in equilibrium.contacts if contact.status in (STICKS, SLIPS)]
     if rubbing:
         raise ParameterError("equilibrium", rubbing, f"one whose contacts have no friction: {what} takes none")
-
-
-def state_in_contact(equilibrium: Equilibrium, what: str) -> ElasticState:
-    """Return the state of an equilibrium whose contacts have no friction; `what` cannot take it, in words.
-
-    Raises:
-        ParameterError: If a contact sticks or slips.
-    """
-    check_no_rubbing(equilibrium, what)
-    return elastic_state(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, equilibrium.load)
 
 
 def motor_slopes(state: ElasticState, load: Load) -> tuple[FloatArray, FloatArray]:

@@ -8,6 +8,7 @@ own axis slides along its skin, and an obstacle that moves takes along what stic
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -237,8 +238,10 @@ class SlidingRobot:
         for row in np.flatnonzero(pressed | (np.abs(gaps.values) <= _TOUCHES * self.reach)).tolist():
             slips = np.linalg.norm(slid[row]) > _SLIPS * self.reach
             status = TOUCHING if not pressed[row] else PRESSED if self.last.friction == 0.0 else SLIPS if slips else STICKS
-            force = float(found.normal[row])
-            contacts.append(contact_at(self.given.surroundings, gaps, row, force, along[row], status, slid[row]))
+            force, mu = float(found.normal[row]), self.last.friction
+            one = contact_at(self.given.surroundings, gaps, row, force, along[row], status, slid[row])
+            share = float(np.linalg.norm(along[row])) / (mu * force) if status in (STICKS, SLIPS) else 0.0
+            contacts.append(replace(one, cone_share=share))
         return tuple(contacts)
 
     def equilibrium(self, found: Balance, iterations: int) -> Equilibrium:
