@@ -44,7 +44,7 @@ def add_parser(subparsers: Any) -> None:
     ):
         option = f"--{name.replace('_', '-')}"
         add_numbers(parser, option, "X", f"{what}, for displacement and force [m] (%(default)s)", default=getattr(rig, name))
-    add_output(parser, "the fit as NPZ, for softrobots.load_result")
+    add_output(parser, "the fit", "as NPZ, for softrobots.load_result")
     add_plot(parser, "the points, the fit and the limits of the moment")
     add_json(parser)
     parser.set_defaults(run=run)

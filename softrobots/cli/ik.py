@@ -13,6 +13,7 @@ from softrobots.cli.options.load_argument import add_environment, add_loads, loa
 from softrobots.cli.options.output_files import (
     RESULT_FILES,
     ROS_FILES,
+    ROS_FORMS,
     add_output,
     add_plot,
     check_output,
@@ -86,10 +87,7 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--gain", "K", f"gain of --method paper [1/s] ({_GAIN:g})")
     help_text = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
     parser.add_argument("--allow-jumps", action="store_true", help=help_text)
-    help_text = (
-        "the solution or trajectory as .npz or .json, for softrobots.load_result, as a .csv table, as .yaml, a message of "
-    )
-    add_output(parser, help_text + "ROS 2, or as .mcap, a log of ROS 2 and Foxglove (extra mcap)")
+    add_output(parser, "the solution or trajectory", ROS_FORMS)
     add_plot(parser, "the loaded shape, or the poses along the path")
     add_json(parser)
     parser.set_defaults(run=run)

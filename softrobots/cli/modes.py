@@ -9,7 +9,6 @@ from typing import Any
 from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
 from softrobots.cli.options.output_files import (
-    RESULT_FILES,
     add_output,
     add_plot,
     check_ending,
@@ -66,7 +65,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Find the modes and print the answer."""
-    check_output(arguments, *RESULT_FILES)
+    check_output(arguments)
     check_plot(arguments)
     positive_integer("--count", arguments.count)
     model = statics_model_of(arguments)

@@ -15,6 +15,7 @@ from softrobots.cli.options.load_argument import add_loads, loads_of
 from softrobots.cli.options.output_files import (
     RESULT_FILES,
     ROS_FILES,
+    ROS_FORMS,
     add_output,
     add_plot,
     check_ending,
@@ -90,10 +91,7 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--time-step", "T", "fixed steps of this length [s] (steps chosen for the tolerance)")
     add_numbers(parser, "--tolerance", "D", "largest error of the tip [m] (5e-4 of the reach); not with --time-step")
     add_numbers(parser, "--output-step", "T", "time between two rows of the result [s] (a 200th of the duration)")
-    help_text = (
-        "the motion as NPZ or .json, for softrobots.load_result, as a .csv table, as .yaml, a message of ROS 2, or as .mcap, "
-    )
-    add_output(parser, help_text + "a log of ROS 2 and Foxglove (extra mcap)")
+    add_output(parser, "the motion", ROS_FORMS)
     add_plot(parser, "the tip over time")
     help_text = "draw the energies and their balance over time into this PNG file (none)"
     parser.add_argument("--energies", type=Path, metavar="FILE.png", help=help_text)

@@ -21,6 +21,7 @@ from softrobots.model.actuators import load_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.loads import Load
 from softrobots.statics.saved_results import pack_model, unpack_model
+from softrobots.statics.tables.columns import joint_columns
 
 _SAME = 1e-6  # relative difference of frequencies that rounding on another machine explains, of fast modes too
 _NUMBERS = ("damping_time", "tip_error", "tolerance")
@@ -72,7 +73,7 @@ def _table(motion: Motion) -> dict[str, FloatArray]:
     """Columns of a CSV file of a motion, each name with its unit."""
     model = motion.model
     motors, springs = (model.actuator_names, model.actuator_units), (model.spring_joints, model.springs.units)
-    table = {"time [s]": motion.time} | named_columns(*motors, motion.q_motors) | named_columns(*springs, motion.q_springs)
+    table = {"time [s]": motion.time} | joint_columns(model, motion.q_motors, motion.q_springs)
     for (names, units), rates in ((motors, motion.motor_velocities), (springs, motion.velocities)):
         table |= named_columns(names, [f"{unit}/s" for unit in units], rates, " velocity")
     table |= named_columns(model.actuator_names, load_units(model.actuator_units), motion.motor_torques, " load")

@@ -20,24 +20,33 @@ RESULT_FILES = (".npz", ".json", ".csv")
 ROS_FILES = (".yaml", ".mcap")
 """Endings of files for ROS 2."""
 
+ROS_FORMS = (
+    "as .npz or .json, for softrobots.load_result, as a .csv table, as .yaml, a message of ROS 2, or as .mcap, a log of "
+    "ROS 2 and Foxglove (extra mcap)"
+)
+"""What is saved in files with an ending of `RESULT_FILES` or `ROS_FILES`."""
 
-def add_output(parser: argparse.ArgumentParser, what: str) -> None:
-    """Add `-o`, which saves `what` as one of `RESULT_FILES`, or as `what` tells; `--overwrite` comes with `add_plot`."""
-    how = "" if " as " in what else " as .npz or .json, for softrobots.load_result, or as a .csv table"
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"save {what}{how} (not saved)")
+
+def add_output(
+    parser: argparse.ArgumentParser,
+    what: str,
+    forms: str = "as .npz or .json, for softrobots.load_result, or as a .csv table",
+) -> None:
+    """Add `-o`, which saves `what` in some forms, `RESULT_FILES` by default; `--overwrite` comes with `add_plot`."""
+    parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"save {what} {forms} (not saved)")
 
 
 def check_output(arguments: argparse.Namespace, *endings: str) -> None:
     """Refuse a file of `-o` that cannot be written.
 
     Raises:
-        ParameterError: If its name has none of the endings.
+        ParameterError: If its name has none of the endings, by default those of `RESULT_FILES`.
         OutputExists: If it exists and `--overwrite` is not given, or it is a folder.
         OutputError: If its folder cannot be created.
         MissingDependency: If it is a log, and what writes it is not installed.
     """
     if arguments.output is not None:
-        check_ending("-o", arguments.output, *endings)
+        check_ending("-o", arguments.output, *(endings or RESULT_FILES))
         if arguments.output.suffix.lower() == ".mcap":
             require_mcap()
         new_file(arguments.output, overwrite=arguments.overwrite)

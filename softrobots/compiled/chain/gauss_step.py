@@ -50,7 +50,7 @@ def placing_blocks(layout: MotionLayout) -> list[Block]:
     blocks = [Block(f"place_{name}_stage", f"Place an unknown at the {name} stage.", ("i",)) for name in ("first", "second")]
     for stage, block in enumerate(blocks):
         places = layout.unknown, layout.rate, layout.acceleration
-        for place, value in zip(places, stage_values(layout, block, stage, 0, "i"), strict=True):
+        for place, value in zip(places, stage_values(layout, block, stage, base="i"), strict=True):
             block.store(place, value, "i")
     blocks[1].store(layout.forces, blocks[1].load(layout.forces + layout.unknowns, "i"), "i")  # of the first stage
     return blocks
@@ -78,7 +78,7 @@ def _apply(layout: MotionLayout, block: Block) -> Block:
     change: Scalar = block.load(layout.change)
     for stage, step in enumerate(steps):
         block.store(layout.stages + stage * n, block.load(layout.stages + stage * n, "i") + step, "i")
-        size = larger(absolute(stage_values(layout, block, stage, 0, "i")[0]), 1.0)
+        size = larger(absolute(stage_values(layout, block, stage, base="i")[0]), 1.0)
         moved = absolute(_weighted(SQUARES[stage], steps)) * (h * h) / size
         change = larger(change, if_less(moved, 1e300, moved, 1e300))  # also of NaN
     block.store(layout.change, change)
@@ -93,7 +93,7 @@ def _finish(layout: MotionLayout, block: Block) -> Block:
     block.store(layout.position, position + h * (velocity + h * beyond), "i")
     block.store(layout.velocity, velocity + h * 0.5 * (accelerations[0] + accelerations[1]), "i")
     for stage in range(2):
-        block.store(layout.history + stage * n, stage_values(layout, block, stage, 0, "i")[0], "i")
+        block.store(layout.history + stage * n, stage_values(layout, block, stage, base="i")[0], "i")
         for place in range(1, KEPT_STEPS):
             earlier = block.load(layout.history + (2 * place - 2 + stage) * n, "i")
             block.store(layout.history + (2 * place + stage) * n, earlier, "i")
