@@ -37,7 +37,7 @@ def elastostatic_jacobian(model: SoftModel, equilibrium: Equilibrium) -> FloatAr
         Shape (3, n_motors) [m/rad or m/m], world axes.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model, or has a contact that slips.
+        ParameterError: If the equilibrium belongs to another model, or a contact slips, or must as motors move.
         NeutralEquilibrium: If its tangent stiffness is singular, see `inverse_stiffness`.
     """
     check_same_model(model, equilibrium)

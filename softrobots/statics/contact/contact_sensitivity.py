@@ -44,7 +44,7 @@ def contact_sensitivity(model: SoftModel, equilibrium: Equilibrium) -> ContactSe
         The derivatives; with no rows where nothing is pressed.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model, or has a contact that slips.
+        ParameterError: If the equilibrium belongs to another model, or a contact slips, or must as motors move.
         NeutralEquilibrium: If the stiffness beside the contacts is singular.
     """
     check_same_model(model, equilibrium)

@@ -35,10 +35,10 @@ def held_contacts(equilibrium: Equilibrium, what: str, *, moves: bool = False) -
     Raises:
         ParameterError: If a contact slips or is about to; or must, as soon as actuators or obstacles move (`moves`).
     """
-    stuck = _stuck(equilibrium, what)
-    if stuck is None:
-        return pressed_gaps(_frictionless(equilibrium))
-    rows, by_motors, _ = held = stuck[1]
+    at = _state(equilibrium, what)
+    if isinstance(at, ElasticState):
+        return pressed_gaps(at)
+    rows, by_motors, _ = held = at[1]
     if moves:
         asked = np.concatenate([by_motors, np.eye(len(rows), len(rows) // 3)], axis=1)
         if np.abs(rows @ np.linalg.lstsq(rows, asked, rcond=_DEPENDENT)[0] - asked).max() > _FORCED * np.abs(asked).max():
@@ -49,24 +49,20 @@ def held_contacts(equilibrium: Equilibrium, what: str, *, moves: bool = False) -
 
 def held_stiffness(equilibrium: Equilibrium, what: str) -> tuple[FloatArray, PressedGaps | None]:
     """Return the stiffness over actuators, then elastic coordinates, shape (n, n), and `held_contacts`; raises as that."""
-    stuck = _stuck(equilibrium, what)
-    if stuck is None:
-        state = _frictionless(equilibrium)
-        return whole_stiffness(state, equilibrium.load), pressed_gaps(state)
-    robot, held = stuck
+    at = _state(equilibrium, what)
+    if isinstance(at, ElasticState):
+        return whole_stiffness(at, equilibrium.load), pressed_gaps(at)
+    robot, held = at
     upper = robot.at.point.motor_derivatives(robot.joint_load(*robot.carried(*_NO_FORCES)))
     return -np.block([list(upper), [equilibrium.coupling, -equilibrium.tangent_stiffness]]), held
 
 
-def _frictionless(equilibrium: Equilibrium) -> ElasticState:
-    return elastic_state(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, equilibrium.load)
-
-
-def _stuck(equilibrium: Equilibrium, what: str) -> tuple[SlidingRobot, PressedGaps] | None:
-    """The robot at its equilibrium with contacts that stick, and what they hold; None if contacts have no friction."""
+def _state(equilibrium: Equilibrium, what: str) -> ElasticState | tuple[SlidingRobot, PressedGaps]:
+    """The state of an equilibrium without friction; or the robot there, and what its sticking contacts hold."""
+    model, motors, springs = equilibrium.model, equilibrium.q_motors, equilibrium.q_springs
     rubbing = tuple(one for one in equilibrium.contacts if one.status in (STICKS, SLIPS))
     if not rubbing:
-        return None
+        return elastic_state(model, motors, springs, equilibrium.load)
     for one in rubbing:
         if one.status == SLIPS or one.cone_share > 1.0 - _RIM:
             does = "slips" if one.status == SLIPS else "is about to slip"
@@ -75,14 +71,13 @@ def _stuck(equilibrium: Equilibrium, what: str) -> tuple[SlidingRobot, PressedGa
             )
             required = f"{required} the stiffness is not symmetric; {what} takes none"
             raise ParameterError("equilibrium", f"{one.link} on {one.obstacle}, which {does}", required)
-    model, springs = equilibrium.model, equilibrium.q_springs
     environment = check_environment(equilibrium.environment)
-    given = Given(model, equilibrium.q_motors, equilibrium.load, environment, Surroundings(model, environment))
+    given = Given(model, motors, equilibrium.load, environment, Surroundings(model, environment))
     gaps = given.surroundings.at(equilibrium.q, MARGIN * model.reach)
     robot = SlidingRobot(given, Sliding(0.0, gaps, forces_of(gaps, rubbing)))
     near: Any = robot.contacts(springs)
     normal, friction = robot.carried(*_NO_FORCES)
     found = balance_of(robot, springs, near, normal, friction, normal > 0.0)
-    motors, one = robot.by_motors(found), robot.pressed(found)
-    by_motors = np.concatenate([motors.gaps[one], *motors.sliding[one]])
+    moved, one = robot.by_motors(found), robot.pressed(found)
+    by_motors = np.concatenate([moved.gaps[one], *moved.sliding[one]])
     return robot, PressedGaps(robot.held_rows(found), by_motors, np.concatenate([normal[one], friction[one].ravel()]))

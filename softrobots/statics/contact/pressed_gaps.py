@@ -19,10 +19,7 @@ if TYPE_CHECKING:
 
 
 class PressedGaps(NamedTuple):
-    """Gaps that stay zero, in the order of the pressed ones of `Equilibrium.contacts`.
-
-    Where contacts stick, after them the two ways of sliding of each (`softrobots.statics.contact.held`).
-    """
+    """Gaps that stay zero, in the order of `Equilibrium.contacts`; after them both ways of sliding of each one that sticks."""
 
     by_springs: FloatArray
     """Their derivatives by the springs, shape (k, n_springs)."""
