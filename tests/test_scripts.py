@@ -196,7 +196,7 @@ def test_make_pictures_photographs_the_arm(tmp_path: Path, capsys: pytest.Captur
     assert run_script("make_pictures", ["--output", str(tmp_path), "--only", "inflatable_arm"]) == 0
     assert [file.name for file in tmp_path.iterdir()] == ["inflatable_arm.png"]
     picture = np.asarray(Image.open(tmp_path / "inflatable_arm.png").convert("RGB")).astype(int)
-    assert picture.shape == (560, 1000, 3)
+    assert picture.shape == (621, 1110, 3)
     assert np.count_nonzero(picture[..., 0] - picture[..., 2] > 60) > 5000  # the warm colours of the links
 
 

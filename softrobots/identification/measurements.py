@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
 from softrobots.core.errors import ParameterError
-from softrobots.core.summary import Summarised
+from softrobots.core.summary import Part, Summarised, facts, field_facts
 from softrobots.identification.measured_robot import check_coordinates, frame_of, wrenches_on
 from softrobots.identification.measurement_checks import (
     TIP,
@@ -167,6 +167,10 @@ class Measurements(MeasurementTables, Summarised):
     def __repr__(self) -> str:
         """Rows, actuators and what was measured in one line."""
         return f"Measurements({len(self)} rows of {self.q_motors.shape[1]} actuators: {', '.join(self.measured)})"
+
+    def summary_parts(self) -> list[Part]:
+        """What there is; the order of actuators only where it is not that of the robot."""
+        return [facts([row for row in field_facts(self) if row != ("actuators", "none")])]
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as the arguments that make the same again."""

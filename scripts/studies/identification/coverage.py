@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from concurrent.futures import ProcessPoolExecutor
 from functools import cache, partial
+from multiprocessing import get_context
 from typing import Any
 
 import numpy as np
@@ -72,7 +73,7 @@ def study(fits: int, seed: int, processes: int = 1) -> dict[str, Any]:
         processes: How many work on it; the result does not depend on it.
     """
     found: dict[str, Any] = {}
-    with ProcessPoolExecutor(processes) as pool:
+    with ProcessPoolExecutor(processes, mp_context=get_context("spawn")) as pool:
         for noise in NOISES:
             done = pool.map(partial(fitted, seed, noise), range(fits), chunksize=10)
             values, held = zip(*tqdm(done, total=fits, desc=f"{noise} noise", unit="fit"), strict=True)
