@@ -282,6 +282,11 @@ def test_bad_input_is_refused_and_says_what_is_required(open_tab: Callable[..., 
     assert tab.shown() == before
     assert tab.run("softrobots.set({motors: {motor_2: 0.1}}).status") == 0
     assert tab.shown()["motors"] == [0.3, 0.1, -0.8]  # the others stay
+    tab.run("softrobots.set({motors: [0, 0, 0], force: [0, -1e-6, 0]})")
+    assert -5e-5 < tab.shown()["tip"][1] < 0.0
+    assert "1.2000  0.0000  0.0000" in re.sub(r"[^\S\n]+", "  ", tab.page.inner_text("#facts"))  # no sign on zero
+    words = open_tab("helix").run("() => { try { softrobots.solve({motors: [1]}); } catch (e) { return e.message; } }")
+    assert words == "motors: [1] came; required: [], the robot has no motors"
 
 
 def test_a_pose_stays_where_there_is_no_equilibrium_and_the_page_says_why(open_tab: Callable[..., Tab]) -> None:

@@ -62,7 +62,10 @@ def link_figure(link: Mapping[str, Any]) -> Any:
         axes.set_xlim(0.0, loads[-1])
     for axes in (region, stiffness, *below):
         axes.grid(alpha=0.3)
-        axes.legend(fontsize=canvas.SMALL, loc="lower right" if axes is stiffness else "best")
+    region.legend(fontsize=canvas.SMALL, loc="upper center", bbox_to_anchor=(0.5, -0.17), ncols=2)
+    stiffness.legend(fontsize=canvas.SMALL, loc="lower right")
+    for axes in below:
+        axes.legend(fontsize=canvas.SMALL, loc="best")
     return drawn
 
 

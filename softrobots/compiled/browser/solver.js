@@ -12,7 +12,8 @@ function numbers(name, value, count, unit, names) {
   const listed = value !== null && typeof value === "object" && Symbol.iterator in value ? Array.from(value) : null;
   if (listed === null || listed.length !== count || !listed.every((one) => typeof one === "number" && Number.isFinite(one))) {
     const came = listed === null ? String(value) : `[${listed.map(String).join(", ")}]`;
-    throw new TypeError(`${name}: ${came} came; required: ${count} finite numbers [${unit}]${names ? `: ${names.join(", ")}` : ""}`);
+    const required = count ? `${count} finite numbers [${unit}]${names ? `: ${names.join(", ")}` : ""}` : `[], the robot has no ${name}`;
+    throw new TypeError(`${name}: ${came} came; required: ${required}`);
   }
   return listed;
 }

@@ -39,9 +39,9 @@ function slider(parent, { name, unit, low, high, step, lower, upper }, read, wri
     if (kept !== field) field.value = Number(value.toFixed(digits));
     small.textContent =
       unit === "rad"
-        ? `${((value * 180) / Math.PI).toFixed(0)}°`
+        ? `${fixed((value * 180) / Math.PI, 0)}°`
         : unit === "m" && Math.abs(high) < 2
-          ? `${(1000 * value).toFixed(1)} mm`
+          ? `${fixed(1000 * value, 1)} mm`
           : "";
     const beyond = value < (lower ?? -Infinity) - 1e-9 || value > (upper ?? Infinity) + 1e-9;
     if (beyond) small.textContent += " beyond its limits";

@@ -7,6 +7,9 @@ const short = (value) =>
       ? value.toExponential(1)
       : String(Number(value.toPrecision(4)));
 
+// A number with so many digits behind the point, without a sign on zero.
+const fixed = (value, digits) => (Number(value.toFixed(digits)) + 0).toFixed(digits);
+
 function report(found) {
   const box = $("status"),
     wrinkled = found.status === CERTIFIED && found.links.some((link) => link.wrinklingMargin <= 0),
@@ -14,7 +17,7 @@ function report(found) {
   box.className = state;
   box.children[1].textContent = wrinkled ? `${found.statusText}, but wrinkled` : found.statusText;
   box.children[2].textContent = state === "bad" ? "the last certified pose stays" : "";
-  const [x, y, z] = (shown ?? found).tip.map((one) => one.toFixed(4).replace("-", "\u2212"));
+  const [x, y, z] = (shown ?? found).tip.map((one) => fixed(one, 4).replace("-", "\u2212"));
   const rows = [
     ["tip [m]", shown ? `${x}  ${y}  ${z}` : "-"],
     ["residual [N m]", short(found.residual)],
