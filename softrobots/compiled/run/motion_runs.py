@@ -15,6 +15,7 @@ from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks, forces_of_steps, motors_of_steps
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
+from softrobots.core.errors import NotConverged
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import State, Step
@@ -183,6 +184,9 @@ def replay(
         rows: Times of the rows, shape (n,) [s].
         facts: Other fields of the motion.
         order: Order of the steps.
+
+    Raises:
+        NotConverged: If a step of fourth order is not found again.
     """
     m, k, count = equations.n_motors, equations.n - equations.n_motors, 2 * len(taken.grid) - 1
     motors, states = np.broadcast_to(motors_of_steps(course.path, taken.grid), (count, m)), taken.rows[0]
@@ -197,8 +201,10 @@ def replay(
         before = recorder.state
         if order == GaussRule.order:
             again = recorder.rule.step(before, end)
-            if again is not None:
-                recorder.add(again._replace(end=still(end, step + 1)))
+            if again is None:
+                said = f"the step from {before.time:g} s to {end:g} s has no energies: Pinocchio did not find it again; "
+                raise NotConverged(f"{said}required shorter steps, or order=2", best=None, residual=math.inf, iterations=step)
+            recorder.add(again._replace(end=still(end, step + 1)))
             continue
         h, middle_time = end - before.time, 0.5 * (before.time + end)
         u0, middle, u1 = motors[2 * step : 2 * step + 3]
