@@ -337,8 +337,10 @@ def test_nothing_penetrates_and_nothing_pulls(kind: str, obstacles: list, direct
     balls = []
     for radius, along, side, apart in obstacles:
         centre = along * free.tip_position + np.array(side) * (radius * robot.reach + apart * robot.reach)
-        balls.append(Sphere(radius * robot.reach, tuple(centre)))
-    assume(distances(robot, balls, robot.configuration(motors)).min() > 0.0)
+        ball = Sphere(radius * robot.reach, tuple(centre))
+        if distances(robot, [ball], robot.configuration(motors)).min() > 0.0:
+            balls.append(ball)
+    assume(balls)
     try:
         found = sr.solve_equilibrium(robot, motors, size * PUSHES[kind] * direction, environment=Environment(balls))
     except sr.EquilibriumNotFound as error:
