@@ -10,9 +10,10 @@ its law.
 
 *The certificate.* The run is repeated with every step halved, again and again. Where halving shrinks the distance between the
 tip paths of successive runs by the factor r, the finer one has the distance over r - 1 as its error: a third for a smooth
-motion, because the scheme is of second order, and all of it for r = 2, which is assumed of the first two runs. (A released rod
-is not smooth: all its modes ring.) That is an estimate, which random runs of arms exceeded by up to 12 %; the error that is
-stated is 1.2 times as large. The last run is the first whose stated error is within the tolerance.
+motion in steps of second order, a seventh at least in those of fourth, whose r is believed up to 8 only, and all of it for
+r = 2, which is assumed of the first two runs. (A released rod is not smooth: all its modes ring.) That is an estimate, which
+random runs of arms exceeded by up to 12 %; the error that is stated is 1.2 times as large. The last run is the first whose
+stated error is within the tolerance.
 """
 
 from __future__ import annotations
