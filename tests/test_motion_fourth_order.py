@@ -52,20 +52,6 @@ def test_a_double_pendulum_swings_as_dop853_says_to_fourth_order() -> None:
         assert len(moved.steps) < 1000  # the midpoint rule takes 12,801 for 1e-6 m
 
 
-def test_a_motion_runs_backwards_to_its_start() -> None:
-    """The scheme is symmetric, too; each of 50 steps is solved to 1e-13."""
-    model = pendulum(3, 4.0)
-    start = sr.solve_equilibrium(model, (), force=(6.0, 0.0, 0.0))
-    options: dict[str, Any] = {"gravity": sr.EARTH_GRAVITY, "damping_time": 0.0, "time_step": 0.02, "order": 4}
-    there = sr.simulate(model, 1.0, (), start=start, **options)
-    end = there.end
-    turned = sr.MotionState(model, 0.0, end.q_motors, end.motor_velocities, end.q_springs, -end.velocities)
-    back = sr.simulate(model, 1.0, (), start=turned, **options)
-    assert np.abs(there.q_springs[-1] - start.q_springs).max() > 0.1
-    assert np.abs(back.q_springs[-1] - start.q_springs).max() < 1e-10
-    assert np.abs(back.velocities[-1]).max() < 1e-8
-
-
 @pytest.mark.parametrize("kind", ["arm", "two_hinges", "odd", "rod"])
 def test_compiled_steps_are_those_of_simulate(kind: str) -> None:
     """Single, in a batch and step by step: unrolled chains, and a looped rod of hinges and a slide at one point."""

@@ -202,8 +202,13 @@ def replay(
         if order == GaussRule.order:
             again = recorder.rule.step(before, end)
             if again is None:
-                said = f"the step from {before.time:g} s to {end:g} s has no energies: Pinocchio did not find it again; "
-                raise NotConverged(f"{said}required shorter steps, or order=2", best=None, residual=math.inf, iterations=step)
+                raise NotConverged(
+                    f"the step from {before.time:g} s to {end:g} s has no energies: Pinocchio did not find it again; required "
+                    "shorter steps, or order=2",
+                    best=None,
+                    residual=math.inf,
+                    iterations=step,
+                )
             recorder.add(again._replace(end=still(end, step + 1)))
             continue
         h, middle_time = end - before.time, 0.5 * (before.time + end)

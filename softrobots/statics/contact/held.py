@@ -40,8 +40,9 @@ def held_contacts(equilibrium: Equilibrium, what: str, *, moves: bool = False) -
         return pressed_gaps(at)
     rows, by_motors, _ = held = at[1]
     if moves:
-        asked = np.concatenate([by_motors, np.eye(len(rows), len(rows) // 3)], axis=1)
-        if np.abs(rows @ np.linalg.lstsq(rows, asked, rcond=_DEPENDENT)[0] - asked).max() > _FORCED * np.abs(asked).max():
+        displacements = np.concatenate([by_motors, np.eye(len(rows), len(rows) // 3)], axis=1)
+        followed = rows @ np.linalg.lstsq(rows, displacements, rcond=_DEPENDENT)[0]
+        if np.abs(followed - displacements).max() > _FORCED * np.abs(displacements).max():
             required = f"one whose springs can follow while its contacts stick: {what} takes none where something must slip"
             raise ParameterError("equilibrium", equilibrium.contacts, required)
     return held
