@@ -32,7 +32,7 @@ class Characterisation(Summarised):
     stiffness_std: float
     """Its standard error (HC3), whether the noise is constant or grows with the reading [N m/rad]."""
     stiffness_interval: tuple[float, float]
-    """Interval in which the true stiffness lies with a probability of 95 % (Student's t) [N m/rad]."""
+    """Interval in which the true stiffness lies with a probability of 95 % (HC2, Student's t) [N m/rad]."""
     angle_offset: float
     """Zero error of the angle: its reading where the moment vanishes [rad]; the given one if it was given."""
     angle_offset_std: float
@@ -89,7 +89,9 @@ def fit_characterisation(
 
     .. math:: s_k = \sqrt{\sum_i \left( \frac{x_i e_i}{1 - h_i} \right)^2} \Big/ \sum_i x_i^2
 
-    with the residuals `e`, the angles `x` from their mean (from the offset, if that is given) and the leverages `h`.
+    with the residuals `e`, the angles `x` from their mean (from the offset, if that is given) and the leverages `h`. HC3 is a
+    little large for few points, and a quantile of `n - 2` too small; the interval is that of Bell and McCaffrey 2002: the root
+    `1 - h` once (HC2), Student's t with the degrees of freedom that this sum has.
 
     Args:
         angle: Hinge angles [rad], shape (n,).
@@ -117,7 +119,7 @@ def fit_characterisation(
         known = law.line.zero
         law = _Law.of(theta - known, tau, limit, fitted, moment)
     line, above = law.line, law.folded[law.folded >= limit]
-    margin = student_quantile(0.5 + 0.5 * CONFIDENCE, line.freedoms) * line.slope_std
+    margin = student_quantile(0.5 + 0.5 * CONFIDENCE, line.slope_freedoms) * line.slope_error
     return Characterisation(
         stiffness=line.slope,
         stiffness_std=line.slope_std,

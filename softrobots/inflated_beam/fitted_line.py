@@ -1,7 +1,8 @@
-"""Least-squares line through the points of a bending test, with the standard errors HC3; quantiles of Student's t."""
+"""Least-squares line through the points of a bending test, with its standard errors and intervals; quantiles of Student's t."""
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -34,10 +35,18 @@ class FittedLine(NamedTuple):
     """Scatter of the level by each point, shape (n,) [N m]."""
     freedoms: int
     """Number of points minus number of fitted numbers."""
+    slope_error: float
+    """Standard error HC2 of the slope, free of bias where the noise is constant [N m/rad]."""
+    slope_freedoms: float
+    """Its degrees of freedom, at most `freedoms`: a sandwich leans on the points far from the centre."""
 
     @classmethod
     def of(cls, x: FloatArray, y: FloatArray, free: bool) -> FittedLine | None:
-        """Fit a line, through the origin unless it is free; None for fewer than three points, or if one determines it alone."""
+        r"""Fit a line, through the origin unless it is free; None for fewer than three points, or if one determines it alone.
+
+        Under constant noise, HC2 is a sum of squares with :math:`(\operatorname{tr} A M)^2 / \operatorname{tr} (A M)^2` degrees
+        of freedom, Bell and McCaffrey 2002: `M` the projection onto the residuals, `A` the diagonal of their weights.
+        """
         n = len(x)
         if n < 3:
             return None
@@ -46,12 +55,18 @@ class FittedLine(NamedTuple):
         spread = float(around @ around)
         if spread <= _EQUAL * float(x @ x):
             return None
-        lacking = 1.0 - around**2 / spread - free / n  # 1 minus the leverage
+        along = around**2 / spread
+        lacking = 1.0 - along - free / n  # 1 minus the leverage
         if lacking.min() < _ALONE:
             return None
         slope = float(around @ y) / spread
         scatter = (y - level - slope * around) / lacking
-        return cls(slope, centre, level, around * scatter / spread, free * scatter / n, n - 1 - free)
+        by_point, freedoms, weights = around * scatter / spread, n - 1 - free, along / lacking
+        squares = float(weights**2 @ (2.0 * lacking - 1.0) + (weights @ along) ** 2)
+        squares += free / n * float(2.0 * (weights @ around) ** 2 / spread + weights.sum() ** 2 / n)
+        effective = min(max(1.0 / squares, 1.0), freedoms) if squares > 0.0 else 1.0
+        error = math.sqrt(float(by_point**2 @ lacking))
+        return cls(slope, centre, level, by_point, free * scatter / n, freedoms, error, effective)
 
     @property
     def slope_std(self) -> float:
