@@ -63,10 +63,11 @@ def test_sixteen_hinges_have_three_frequencies_to_a_thousandth(tip: float) -> No
     assert np.abs(errors(STEEL, 16, tip, chain="lumped")).max() < 1e-3
 
 
+@pytest.mark.parametrize("chain", [HINGES, {"chain": "flexures"}], ids=["hinges", "flexures"])
 @pytest.mark.parametrize("tip", [0.0, 0.5, 3.0])
-def test_frequencies_of_hinges_are_of_fourth_order(tip: float) -> None:
+def test_frequencies_of_hinges_and_flexures_are_of_fourth_order(tip: float, chain: dict[str, object]) -> None:
     """3.8: room for the next order. With a mass at the tip, errors of modes 2 and 3 change sign, and are smaller."""
-    coarse, fine = (errors(THIN, count, tip, **HINGES) for count in (16, 32))
+    coarse, fine = (errors(THIN, count, tip, **chain) for count in (16, 32))
     shown = slice(1 if tip else 3)
     assert np.log2(coarse[shown] / fine[shown]).min() > 3.8
     assert np.abs(fine).max() < 2e-5

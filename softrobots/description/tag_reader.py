@@ -142,6 +142,10 @@ def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]
     ei, gj, ea = (positive(element, key, where) for key in ("EI", "GJ", "EA"))
     facts = _facts_of_section(element, where)
     relaxed = _strains(element, "relaxed", where) if "relaxed" in element.attrib else facts["rest"]
+    facts["bends"] = positive(element, "bends", where) if "bends" in element.attrib else facts["length"]
+    facts["hinge"] = number(element, "hinge", where) if "hinge" in element.attrib else 0.0
+    if facts["bends"] > facts["length"] or facts["hinge"] < 0.0:
+        raise DescriptionError(f"{where} has bends {facts['bends']}, hinge {facts['hinge']}; required: <= length and >= 0")
     return SectionTag(joints=joints, bending_stiffness=ei, torsional_stiffness=gj, axial_stiffness=ea, relaxed=relaxed, **facts)
 
 

@@ -85,6 +85,10 @@ class SectionTag(AnySectionTag):
     """EA [N]."""
     relaxed: tuple[float, ...]
     """Strains where it carries nothing, as `rest`."""
+    bends: float
+    """Rest length of the part of it that bends, between straight rigid ones [m]."""
+    hinge: float = 0.0
+    """Length of rod from its start to that part [m]."""
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -28,9 +28,9 @@ def capsule_error(model: SoftModel, q_motors: Any, q_springs: Any | None = None)
 
     No point of the tube around the centre line is farther than that outside of the capsules, and no point of the capsules
     outside of the tube: no gap to an obstacle differs by more. It is attained along sections of constant strain whose body is
-    around the chain, unless their chord is shorter than half of that at rest. The body of a lumped section is the arc that
-    touches its two pieces at their ends. At both ends of the chain the capsules have caps, by which they are a radius longer
-    than a tube with flat ends. Straight links are exact between their hinges.
+    around the chain, unless their chord is shorter than half of that at rest. The body of a lumped section, and of one
+    with a flexure, is the arc that touches its two pieces at their ends. At both ends of the chain the capsules have caps, by
+    which they are a radius longer than a tube with flat ends. Straight links are exact between their hinges.
 
     Args:
         model: The robot, with the capsules of the descriptions of this package.
@@ -53,12 +53,12 @@ def capsule_error(model: SoftModel, q_motors: Any, q_springs: Any | None = None)
     z = model.structure.section_coordinates(motors, elastic)
     rest, lengths = np.array([row.rest for row in rows]), np.array([row.length for row in rows])
     radius = np.array([row.radius for row in rows])
-    if model.structure.constant_strain:
-        middle = np.array([[*row.middle, 0.0] for row in rows])
-        return _of_sections(z, rest, lengths, radius, middle)
-    hinges = np.array([row.hinge for row in rows])
-    numbers = np.array([row.segment for row in rows])
-    return _of_lumped(z - rest, rest, lengths, radius, hinges, np.diff(numbers) == 0)
+    hinges, numbers = np.array([row.hinge + 0.5 * row.bends for row in rows]), np.array([row.segment for row in rows])
+    of_hinges = _of_lumped(z - rest, rest, lengths, radius, hinges, np.diff(numbers) == 0)
+    if not model.structure.constant_strain:
+        return of_hinges
+    of_sections = _of_sections(z, rest, lengths, radius, np.array([[*row.middle, 0.0] for row in rows]))
+    return np.where([row.bends < row.length for row in rows], of_hinges, of_sections)
 
 
 def _sagitta(turn: FloatArray, velocity: FloatArray) -> FloatArray:

@@ -250,12 +250,14 @@ def _tube_actuators() -> Rules:
 def _chain(robot: ContinuumArm | HelixTube, segment: int, names: Mapping[str, str]) -> Rules:
     """Rules of the sections of a segment and of their joints; `names` are the expressions of the properties of a section."""
     rules: Rules = {}
-    lumped, length, chord = robot.chain == "lumped", names["length"], names["chord"]
-    if lumped:
+    length, flexures = names["length"], robot.chain == "flexures"
+    chord = f"{length} / 2" if flexures else names["chord"]
+    if robot.chain == "lumped":
         count, travel = robot.hinges, {"stretch": (f"-0.9 * {length}", f"0.9 * {length}")}
         kinds = dict(zip(STRAINS, ("EI", "EI", "GJ", "EA"), strict=True))
     else:
-        count, travel = robot.elastic_sections, {"c": (f"-0.9 * {chord}", chord), "r3": ("-pi", "pi")}
+        count = robot.hinges if flexures else robot.elastic_sections
+        travel = {"c": (f"-0.9 * {chord}", chord), "r3": ("-pi", "pi")}
         kinds = {kind: {"c": "EA", "r3": "GJ"}.get(kind, "EI") for kind in JOINTS}
     place_of: dict[int, str] = {}  # of a hinge in its section, if not in the middle
     if robot.hinge_rule == "corrected" and count > 3:
@@ -266,7 +268,8 @@ def _chain(robot: ContinuumArm | HelixTube, segment: int, names: Mapping[str, st
     for j in range(1, count + 1):
         section = f"section_{segment}_{j}"
         rules |= {(section, name): names[name] for name in ("length", "rest", "relaxed", "radius", "EI", "GJ", "EA")}
-        rules[section, "hinge"] = f"{length} * ({place_of.get(j, '1 / 2')})"
+        rules[section, "hinge"] = f"{length} * ({place_of.get(j, '1 / 2')}{' - 1 / 4' if flexures else ''})"
+        rules[section, "bends"] = chord
         for kind, tag in kinds.items():
             joint, stiffness = f"{section}_{kind}", f"{names[tag]} / {length}"
             rules[joint, "stiffness"], rules[joint, "rest"] = stiffness, "0.0"

@@ -79,7 +79,7 @@ def assemble(
         names = [name for row in sections for name in row.joint_names]
         indices = velocity_indices(rigid, names).reshape(len(sections), -1)
         elastic_limits[indices] = _joint_limits(rigid, names).reshape(*indices.shape, 2)
-        lengths, rest_joints = (np.array([getattr(row, name) for row in sections]) for name in ("length", "rest_joints"))
+        lengths, rest_joints = (np.array([getattr(row, name) for row in sections]) for name in ("bends", "rest_joints"))
         coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv)
     friction = None
     if any(tag.bending > 0.0 or (tag.guides > 0.0 and muscles) for tag in tags.friction):
@@ -251,11 +251,11 @@ def _section_rows(tags: Sequence[SectionTag], first: int) -> list[SectionRow]:
     if not tags:
         return []
     rest = rest_coordinates(tags)
-    joints = joint_positions(rest, np.array([tag.length for tag in tags]))
-    places = first + np.arange(4 * len(tags)).reshape(-1, 4)
+    joints = joint_positions(rest, np.array([tag.bends for tag in tags]))
+    by_name = [{name: first + 4 * row + k for k, name in enumerate(STRAINS)} for row in range(len(tags))]
     return [
-        SectionRow(t.name, t.segment, t.length, t.radius, 0.0, t.joints, at, z, dict(zip(STRAINS, row, strict=True)), t.middle)
-        for t, at, z, row in zip(tags, joints, rest, places.tolist(), strict=True)
+        SectionRow(t.name, t.segment, t.length, t.radius, t.hinge, t.bends, t.joints, at, z, place, t.middle)
+        for t, at, z, place in zip(tags, joints, rest, by_name, strict=True)
     ]
 
 
@@ -263,7 +263,7 @@ def _lumped_row(tag: LumpedSectionTag, spring_joints: tuple[str, ...]) -> Sectio
     places = {name: spring_joints.index(joint) for name, joint in tag.joints.items()}
     joints = tuple(tag.joints.values())
     rest = rest_coordinates([tag])[0]
-    return SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, joints, np.zeros(6), rest, places)
+    return SectionRow(tag.name, tag.segment, tag.length, tag.radius, tag.hinge, 0.0, joints, np.zeros(6), rest, places)
 
 
 def _strain_springs(rigid: Any, tags: Sequence[SpringTag], joints: tuple[str, ...], sections: Sequence[SectionTag]) -> Springs:

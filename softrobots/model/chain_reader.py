@@ -162,7 +162,7 @@ def _elements(model: Any, path: list[int], structure: Structure) -> tuple[tuple[
             axes = np.eye(3)
             bodies = tuple(_body(model.inertias[number], axes) for number in numbers)
             strain = len(structure.spring_joints) + len(STRAINS) * sections[joint]
-            elements.append(ChainSection(row.name, _snapped(rotation @ back), translation, row.length, strain, bodies))
+            elements.append(ChainSection(row.name, _snapped(rotation @ back), translation, row.bends, strain, bodies))
         else:
             number, path = path[0], path[1:]
             slides, axes = _axes(model, number, neutral)

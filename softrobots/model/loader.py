@@ -232,7 +232,7 @@ def _check_joints(model: Any, label: str) -> None:
 
 def _check_sections(model: Any, sections: Sequence[SectionTag], label: str) -> None:
     """Refuse six joints that are not the chain of `strain_chain` with the rest shape of their section in its origins."""
-    places = joint_positions(rest_coordinates(sections), np.array([section.length for section in sections]))
+    places = joint_positions(rest_coordinates(sections), np.array([section.bends for section in sections]))
     origins = np.tile(np.eye(4), (*places.shape, 1, 1))
     for place, axis in ((1, 1), (3, 0), (4, 1), (5, 2)):
         sine, cosine, (one, two) = np.sin(places[:, place]), np.cos(places[:, place]), ((axis + 1) % 3, (axis + 2) % 3)

@@ -25,9 +25,9 @@ def model_numbers(model: SoftModel) -> Numbers:
     `placements` (n_joints, 3, 4) and `frames` (n_frames, 3, 4): rotation and position of joints and frames in the joint before
     them; `masses` (n_joints, 4): mass and first moment of the bodies beyond joints; `stiffness` and `rest` (n_strains,);
     `moments` (n_groups,): the moment of the law of each inflated link; `section_lengths` (n_sections,) and `section_joints`
-    (n_sections, 6): of sections of constant strain; `path_*` (n_paths, ...): constants of `MusclePaths`; `path_rest`,
-    `straightened` and `laws` (n_muscles, ...): of actuators, see `LAW`; `held_slopes` and `held_elastic`: of `MuscleLengths`;
-    `bending_friction` and `guide_friction`: of `DryFriction`.
+    (n_sections, 6): of what bends of sections of constant strain; `path_*` (n_paths, ...): constants of `MusclePaths`;
+    `path_rest`, `straightened` and `laws` (n_muscles, ...): of actuators, see `LAW`; `held_slopes` and `held_elastic`: of
+    `MuscleLengths`; `bending_friction` and `guide_friction`: of `DryFriction`.
     """
     rigid, structure, held = model.pinocchio, model.structure, model.structure.muscle_lengths
     paths, springs, friction = structure.muscle_paths, structure.strain_springs, structure.friction
@@ -41,7 +41,7 @@ def model_numbers(model: SoftModel) -> Numbers:
         "stiffness": springs.stiffness,
         "rest": springs.rest,
         "moments": np.array([one.linear_up_to or 0.0 for one in strain_springs(model).groups]),
-        "section_lengths": np.array([row.length for row in sections]),
+        "section_lengths": np.array([row.bends for row in sections]),
         "section_joints": np.array([row.rest_joints for row in sections]).reshape(-1, 6),
         "path_length": paths.length,
         "path_arms": paths.arms,

@@ -22,7 +22,9 @@ class SectionRow(NamedTuple):
     radius: float
     """Radius of the body, for pictures [m]."""
     hinge: float
-    """Rest length of the piece from its start to its joints [m]; 0 if it is not lumped."""
+    """Rest length of the piece from its start to its joints [m]."""
+    bends: float
+    """Rest length of the part of it that bends, between straight rigid ones; 0 if it is lumped [m]."""
     joint_names: tuple[str, ...]
     """Its joints."""
     rest_joints: FloatArray
@@ -37,7 +39,7 @@ class SectionRow(NamedTuple):
     @property
     def lumped(self) -> bool:
         """Whether its coordinates are those of spring joints."""
-        return self.hinge > 0.0
+        return self.bends == 0.0
 
     @property
     def origin(self) -> FloatArray:

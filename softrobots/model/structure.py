@@ -120,4 +120,4 @@ class Structure:
             return ()
         rows = zip(self.section_table, self.section_coordinates(motors, elastic), strict=True)
         folded = self.muscle_paths.at(1.05 * self.strains(motors, elastic)).folded
-        return tuple(row.name for row, z in rows if row.name in folded or not in_range(1.05 * z, row.length))
+        return tuple(row.name for row, z in rows if row.name in folded or not in_range(1.05 * z, row.bends))

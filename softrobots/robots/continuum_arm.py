@@ -79,7 +79,9 @@ class ContinuumArm(XacroRobot):
     )
     linear_density: PerPart = per_part(0.6, "kg/m", "Mass per rest length", "assumed", above=0.0)
     radius: PerPart = per_part(0.05, "m", "Radius of the body; for inertia and pictures", "assumed", above=0.0)
-    chain: str = parameter("sections", "", "Form of the equivalent rigid chain: sections or lumped", options=CHAINS)
+    chain: str = parameter(
+        "sections", "", "Form of the equivalent rigid chain: sections, lumped or flexures", options=(*CHAINS, "flexures")
+    )
     elastic_sections: int = parameter(
         4,
         "",
@@ -88,13 +90,13 @@ class ContinuumArm(XacroRobot):
         at_most=MOST_SECTIONS,
     )
     hinges: int = parameter(
-        12, "", "Pairs of orthogonal springs a segment, for chain = lumped", at_least=1, at_most=MOST_SECTIONS
+        12, "", "Pairs of orthogonal springs a segment, or flexures, unless chain = sections", at_least=1, at_most=MOST_SECTIONS
     )
     hinge_rule: str = parameter(
         "corrected",
         "",
-        "Where the hinges stand, for chain = lumped: midpoint (in the middle of their sections) or corrected (the outer ones "
-        "of a segment moved so that it bends exactly under an end load and its own weight)",
+        "Where the hinges stand, unless chain = sections: midpoint (in the middle of their sections) or corrected (the outer "
+        "ones of a segment moved so that it bends exactly under an end load and its own weight)",
         options=HINGE_RULES,
     )
     torsion: bool = parameter(True, "", "Whether a lumped segment can twist: a torsional spring a hinge")
@@ -161,8 +163,8 @@ class ContinuumArm(XacroRobot):
     @property
     def n_joints(self) -> int:
         """Number of movable joints of the chain."""
-        each = 6 * self.elastic_sections if self.chain == "sections" else self.hinges * (2 + self.torsion + self.extension)
-        return self.n_segments * each
+        each = {"sections": 6 * self.elastic_sections, "lumped": self.hinges * (2 + self.torsion + self.extension)}
+        return self.n_segments * each.get(self.chain, 6 * self.hinges)
 
     @property
     def n_actuators(self) -> int:
@@ -238,6 +240,10 @@ class ContinuumArm(XacroRobot):
     def _check_actuators(self) -> None:
         """Refuse parameters of actuators that have no effect, and a least tension above the largest."""
         prefix, facts = f"{self.ACTUATOR}_", facts_of(self)
+        if self.chain == "flexures" and self.n_actuators:
+            raise ParameterError(
+                "chain", self.chain, f"sections or lumped for an arm with actuators; {prefix}azimuths=() for a rod without"
+            )
         used = {number for kind in self.kind for number in NUMBERS[kind]}
         for name, attribute in ATTRIBUTES.items():
             if prefix + name in facts and attribute not in used:
