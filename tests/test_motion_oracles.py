@@ -138,7 +138,7 @@ def test_free_vibration_is_that_of_mujoco(twists: bool, tool: Callable[[str], Mo
 
 
 def test_flexures_reach_as_far_as_the_rod() -> None:
-    """The elastica in closed form, of a tip that turns by 54 and 74 degrees: flexures are of fourth order, hinges of second.
+    """The elastica in closed form, of a tip that turns by 45 and 64 degrees: flexures are of fourth order, hinges of second.
 
     3.3: twice the stretch of the rod, 1e-7 of its length, is in the finer error, and room for the next order.
     """
