@@ -742,7 +742,7 @@ REFUSED = [
     (("load", "inflatable_arm", "--torques", *"123", "--torque-std", "-1"), "--torque-std must be positive"),
     (("load", "inflatable_arm", "--torques", *"123", "--stiffness-std", "1", "2"), "spring_1_side [-], spring_1_up [-]"),
     (("load", "inflatable_arm", "--torques", *"123", "--motor-angle-std", "1", "2"), "--motor-angle-std must be 3 numbers"),
-    (("load", "pcc_arm", "--torques", *"123456", "--motor-angle-std", "1"), "--motor-angle-std must be left out for a robot"),
+    (("load", "pcc_arm", "--torques", *"123456", "--stiffness-std", "1"), "--stiffness-std must be left out for a robot"),
     (("load", "inflatable_arm", "--torques", *"123", "--frame", "nobody"), "no frame is called 'nobody'"),
     (
         ("load", "inflatable_arm", "--torques", *"123", "-o", "x.txt"),

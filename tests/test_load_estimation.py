@@ -348,11 +348,28 @@ def test_the_force_is_within_its_errors_in_95_of_100_cases(kind: str, cases: int
     assert coverage(measured_robot(kind), cases, 1) == pytest.approx(0.95, abs=0.01 * np.sqrt(6000 / cases))
 
 
-def test_muscles_have_no_angles() -> None:
+@pytest.mark.parametrize(("kind", "change"), [("length", -0.004), ("elastic", -0.004), ("mckibben", 5e4)])
+def test_errors_of_what_is_given_to_muscles_are_those_of_differences(
+    kind: str, change: float, rng: np.random.Generator
+) -> None:
+    """Lengths, motors behind elastic tendons, pressures; central differences of whole estimates, 1e-5 of the part."""
+    robot, force, gravity = sr.load_model(sr.PccArm(kind=kind)), np.array([0.8, -0.5, -1.0]), sr.EARTH_GRAVITY
+    given = robot.relaxed_motors + change * rng.uniform(0.2, 1.0, robot.n_motors)
+    stds = abs(change) * rng.uniform(0.01, 0.03, robot.n_motors)
+
+    def estimated(off: np.ndarray, **errors: Any) -> sr.LoadEstimate:
+        tensions = sr.solve_equilibrium(robot, given + off, force, gravity=gravity, tolerance=1e-13).motor_torques
+        return sr.estimate_load(robot, given, tensions, gravity=gravity, restart=False, **errors)
+
+    part = estimated(0.0 * stds, motor_angle_std=stds).covariance_parts["motor_angles"]
+    moves = np.array([(estimated(0.01 * off).force - estimated(-0.01 * off).force) / 0.02 for off in np.diag(stds)])
+    assert np.abs(moves.T @ moves - part).max() <= 1e-5 * np.abs(part).max()
+
+
+def test_muscles_have_no_stiffness_of_springs() -> None:
     pcc = sr.load_model(sr.PccArm())
-    for option in ({"stiffness_std": 0.03}, {"motor_angle_std": 0.01}):
-        with pytest.raises(sr.ParameterError, match="for a robot with muscles; torque_std is available"):
-            sr.estimate_load(pcc, pcc.relaxed_motors, np.zeros(6), **option)
+    with pytest.raises(sr.ParameterError, match="torque_std and motor_angle_std are available"):
+        sr.estimate_load(pcc, pcc.relaxed_motors, np.zeros(6), stiffness_std=0.03)
 
 
 # --- Several explanations

@@ -38,19 +38,18 @@ class MeasurementErrors(NamedTuple):
     stiffness_std: FloatArray | None
     """Of the stiffness of each spring, as a share of it, shape (n_springs,) [-]; one error for all springs that bend a link."""
     motor_angle_std: FloatArray | None
-    """Of the motor coordinates, shape (n_motors,) [rad or m]."""
+    """Of the motor coordinates, shape (n_motors,) [rad or m; N or Pa of a tension or pressure]."""
 
     @classmethod
     def of(cls, model: SoftModel, torque_std: Any, stiffness_std: Any, motor_angle_std: Any) -> MeasurementErrors:
         """Check standard deviations, one number each or one for each motor or spring; None: unknown.
 
         Raises:
-            ParameterError: If a shape differs, a number is not positive, or stiffness or motor angles are given for a robot
-                with muscles.
+            ParameterError: If a shape differs, a number is not positive, or stiffness is given for a robot with muscles.
         """
-        for name, value in (("stiffness_std", stiffness_std), ("motor_angle_std", motor_angle_std)):
-            if model.muscles and value is not None:
-                raise ParameterError(name, value, "left out for a robot with muscles; torque_std is available")
+        if model.muscles and stiffness_std is not None:
+            available = "left out for a robot with muscles; torque_std and motor_angle_std are available"
+            raise ParameterError("stiffness_std", stiffness_std, available)
         return cls(
             _spread("torque_std", torque_std, model.n_motors, "N m"),
             _spread("stiffness_std", stiffness_std, model.n_springs, "-"),
@@ -78,8 +77,9 @@ class MeasurementErrors(NamedTuple):
             bent = model.springs.at(state.q_springs)[2] * (self.stiffness_std * (state.q_springs - model.rest))
             parts["stiffness"] = follow.T @ bent @ _shared(model)
         if self.motor_angle_std is not None:
-            direct, _ = motor_slopes(state, load)
-            parts["motor_angles"] = -(direct + followed) * self.motor_angle_std
+            direct, by_springs = motor_slopes(state, load)
+            by_law = (by_springs - state.load.coupling.T) @ follow  # of a tension by law, not conjugate to its input
+            parts["motor_angles"] = -(direct + followed + by_law) * self.motor_angle_std
         return parts
 
 
