@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import itertools
+from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.statics.contact import contact_walk
 from tests.support.laws import law
 from tests.support.planar_robots import block
 
@@ -126,3 +130,39 @@ def test_what_friction_cannot_have_is_refused(arm: sr.SoftModel) -> None:
     for options in ({}, {"environment": WALL, "allow_jumps": True}):
         with pytest.raises(sr.ParameterError, match="friction"):
             sr.follow_trajectory(arm, [(0.9, 0.0, 0.7)], friction=0.3, **options)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("friction", [0.7, 1.0])
+def test_a_tip_that_jams_on_a_wall_is_let_press_less(start: sr.Equilibrium, friction: float) -> None:
+    """Any place of the wall has a solution, with less force if not with more; it is one of the free robot under that force."""
+    path = along_the_wall(start, np.linspace(0.0, 0.02, 5), friction)
+    assert path.tip_error.max() < 1e-9
+    for found in path.equilibria[1:]:
+        for contact in found.contacts:
+            along = contact.force - contact.normal_force * contact.normal
+            assert np.linalg.norm(along) <= friction * contact.normal_force * (1.0 + 1e-6) + 1e-9
+        free = sr.solve_equilibrium(found.model, found.q_motors, WEIGHT + sum(one.force for one in found.contacts))
+        lever = 0.055 * sum(np.linalg.norm(one.force) for one in found.contacts)  # it acts on the tip's cap
+        assert free.tip_position == pytest.approx(found.tip_position, abs=1e-9 + 0.01 * lever)
+
+
+def test_an_interrupted_path_ends_where_it_was(start: sr.Equilibrium, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C at the third waypoint leaves the two before it."""
+    rows = contact_walk.ContactWalk.rows
+
+    def interrupted(walk: contact_walk.ContactWalk, first: Any, count: int) -> Iterator[Any]:
+        yield from itertools.islice(rows(walk, first, count), 2)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(contact_walk.ContactWalk, "rows", interrupted)
+    path = along_the_wall(start, np.linspace(0.0, 0.02, 5), 0.1)
+    assert len(path.equilibria) == len(path.times) == len(path.targets) == 2
+    assert path.tip_error.max() < 1e-9
+    assert path.contact_path is not None
+    assert path.contact_path.ended == "interrupted"
+
+
+def test_a_start_with_other_motors_is_refused(start: sr.Equilibrium) -> None:
+    with pytest.raises(sr.ParameterError, match="the motors of the first row"):
+        sr.follow_contact(start.model, [[0, 0.8, -0.4]] * 2, WEIGHT, environment=WALL, friction=0.1, start=start)

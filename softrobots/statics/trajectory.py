@@ -183,7 +183,7 @@ def follow_trajectory(
     With friction the target goes straight from waypoint to waypoint in the quasi-static steps of `follow_contact`, and the
     motors are those with which a step ends at its target. At the first one contacts have no friction yet; from there on each
     sticks or slips, so that the answer depends on the way. A tip on an obstacle may press on it more or less: motors change
-    least in a step, as without friction.
+    least in a step, as without friction; where the tip so jams, it presses less where it sticks before it goes on.
 
     Args:
         model: The robot, with at least one motor.
@@ -207,7 +207,7 @@ def follow_trajectory(
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
-        The trajectory.
+        The trajectory; with friction as far as it was followed, if it is interrupted (Ctrl-C).
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has not enough actuators
@@ -255,7 +255,9 @@ def follow_trajectory(
     def follow_from(first: Equilibrium) -> Trajectory:
         if rubs:
             path = follow_targets(model, goals, moments, load, first, friction, tolerance=tolerance, progress=progress)
-            return Trajectory(read_only(moments), read_only(points), path.equilibria, method, orientations, path)
+            count = len(path.equilibria)
+            turned = None if orientations is None else orientations[:count]
+            return Trajectory(path.parameters, read_only(points[:count]), path.equilibria, method, turned, path)
         steps = (
             paper_steps(model, points, moments, load, first, gain)
             if method == "paper"

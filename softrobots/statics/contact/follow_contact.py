@@ -69,8 +69,8 @@ def follow_contact(
         The path, as far as it was followed if it is interrupted (Ctrl-C).
 
     Raises:
-        ParameterError: If an argument has the wrong shape, is not finite or out of range, rows differ in number, or the robot
-            has dry friction of its own.
+        ParameterError: If an argument has the wrong shape, is not finite or out of range, rows differ in number, `start` has
+            other motors than the first row, or the robot has dry friction of its own.
         NameNotFound: If a frame does not exist.
         EquilibriumNotFound: If there is no equilibrium at the first parameter, or the robot comes to no rest; `best` is then
             the path so far.
@@ -216,6 +216,9 @@ def _first(course: Course, friction: float, start: Equilibrium | None) -> Rest:
         here = solve_equilibrium(given.model, given.q_motors, environment=given.environment)
     else:
         check_same_model(given.model, start, "start")
+        if not np.allclose(start.q_motors, given.q_motors, rtol=1e-9, atol=1e-9):
+            requirement = f"an equilibrium with the motors of the first row, {given.q_motors.tolist()}"
+            raise ParameterError("start", start.q_motors.tolist(), requirement)
         here = start
     rest = at_rest(unloaded if start is None else given, here, friction)
     if rest is not None and start is None:

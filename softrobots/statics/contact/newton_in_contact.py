@@ -31,10 +31,16 @@ def newton_change(here: Balance, coefficient: float) -> tuple[FloatArray, FloatA
     return None if found is None else (found[0][:, 0], found[1][:, 0], found[2][:, :, 0])
 
 
-def followed(here: Balance, coefficient: float, by_motors: ByMotors) -> tuple[FloatArray, FloatArray] | None:
-    """Return Newton's change of the coordinates, shape (n,), and their derivatives by the actuators, shape (n, n_motors)."""
+def followed(
+    here: Balance, coefficient: float, by_motors: ByMotors
+) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray] | None:
+    """Return Newton's change of the coordinates, shape (n,), and what follows the actuators.
+
+    That is the derivatives of the coordinates, shape (n, n_motors), of the normal forces, shape (m, n_motors), and
+    of friction, shape (m, 2, n_motors).
+    """
     found = _solved(here, coefficient, by_motors)
-    return None if found is None else (found[0][:, 0], found[0][:, 1:])
+    return None if found is None else (found[0][:, 0], found[0][:, 1:], found[1][:, 1:], found[2][:, :, 1:])
 
 
 def _solved(here: Balance, coefficient: float, by_motors: ByMotors) -> tuple[FloatArray, FloatArray, FloatArray] | None:

@@ -6,7 +6,8 @@ condition that the tip is at the target of the step. Springs and forces follow t
 change (`statics.contact.newton_in_contact`), so that the motors are found as without friction (`statics.tip_search`).
 
 Where a contact begins to slip, or slips back, its friction turns while the tip hardly moves: motors turn by a finite angle for
-a small way of the tip. They are then turned in small steps first.
+a small way of the tip. They are then turned in small steps first. Where the tip jams, since the motors that change least press
+it ever harder on its obstacle, they first let it press less where it sticks.
 """
 
 from __future__ import annotations
@@ -32,10 +33,12 @@ from softrobots.statics.contact.quasi_static import FAR, Rest, at_rest, change, 
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_goal import Goal
+from softrobots.statics.tip_path.press_less import press_less
 from softrobots.statics.tip_search import SAME, WARM_DAMPING, LocalSolution, advance, search, tip_models
 from softrobots.statics.tip_steps import TipModel
 
 _MOST_TURNS = 100  # small steps of the motors before one of the tip
+_MOST_EASED = 8  # times that a jammed tip is let press less
 _MOST_NEARER = 5  # corrections of motors that turn more than they must
 _NO_MOTION = 1e-6  # of the tip, relative to the largest
 
@@ -118,7 +121,7 @@ class RubbingTip:
         found = followed(assumed, friction, by_motors)
         if found is None:
             return None
-        shift, follow = found
+        shift, follow, *_ = found
         motors, springs = state.robot.at.point.columns(self.goal.jacobian(self.model, state.robot.at.q))
         return TipModel(self.missing(state) - springs @ shift, motors + springs @ follow, follow, shift)
 
@@ -215,17 +218,28 @@ class TargetWay:
         return found
 
     def blocked(self, place: float, here: Rest) -> Rest | None:
-        """Refuse to go on.
+        """Let a tip that jams press less, and go on.
 
         Raises:
-            TargetUnreachable: Always.
+            TargetUnreachable: If it does not move then either.
         """
+        work, eased = 0.0, here
+        for _ in range(_MOST_EASED):
+            less = press_less(eased) if eased.statuses else None
+            if less is None:
+                break
+            eased, work = less, work + less.work
+            there = self.step(place, eased)
+            if there is not None:
+                return there._replace(work=work + there.work)
         number = min(int(place), len(self._goals) - 2) + 2
         best = here.equilibrium()
         left = float(np.linalg.norm(self._goals[number - 1].position - best.tip_position))
+        held = [f"{one.link!r} {one.status} on {one.obstacle!r} with {one.normal_force:.3g} N" for one in best.contacts]
         raise TargetUnreachable(
             f"waypoint {number} of {len(self._goals)}: with friction no small step leads nearer from where the tip is "
-            f"{left:.6g} m from it, with motors {best.q_motors.round(6).tolist()}",
+            f"{left:.6g} m from it, with motors {best.q_motors.round(6).tolist()}"
+            + (f"; {', '.join(held)}, also when pressed less" if held else ""),
             best=best,
             residual=left,
             iterations=best.iterations,
@@ -255,6 +269,9 @@ def follow_targets(
         tolerance: Largest distance of the tip from a waypoint [m].
         progress: See `follow_trajectory`.
 
+    Returns:
+        The path, as far as it was followed if it is interrupted (Ctrl-C).
+
     Raises:
         TargetUnreachable: If a waypoint cannot be reached from the last one.
         EquilibriumNotFound: If the robot is not at rest at the first one.
@@ -265,10 +282,16 @@ def follow_targets(
         raise EquilibriumNotFound(
             "the robot does not rest at the first waypoint", best=first, residual=first.residual, iterations=first.iterations
         )
-    rows, worked = list[Equilibrium](), list[float]()
-    for rest in with_progress(
-        walk.rows(begin, len(goals)), progress, label="waypoints in contact", unit="wp", total=len(goals)
-    ):
-        rows.append(rest.equilibrium())
-        worked.append(walk.work)
-    return ContactPath(times, tuple(rows), friction, read_only(np.array(worked)), tuple(walk.events), ())
+    rows, worked, ended = list[Equilibrium](), list[float](), ""
+    steps = with_progress(walk.rows(begin, len(goals)), progress, label="waypoints in contact", unit="wp", total=len(goals))
+    try:
+        for rest in steps:
+            rows.append(rest.equilibrium())
+            worked.append(walk.work)
+    except KeyboardInterrupt:
+        if not rows:
+            raise
+        ended = "interrupted"
+    return ContactPath(
+        read_only(times[: len(rows)].copy()), tuple(rows), friction, read_only(np.array(worked)), tuple(walk.events), (), ended
+    )
