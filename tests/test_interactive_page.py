@@ -13,6 +13,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.view.body import body
+from softrobots.view.interactive.robot_data import robot_data
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.slider_ranges import visible_force
 from studies.gallery.live_pages import LIVE_PAGES
@@ -409,3 +410,10 @@ def test_guides_begin_with_a_page_which_the_site_shows() -> None:
         shown = hook(f'<p><a href="{page}"><img alt="{words}" src="{picture}" /></a></p>')
         assert f'<iframe class="live" src="{page}" title="{words}" loading="lazy"></iframe>' in shown
         assert "<img" not in shown
+
+
+def test_the_tube_of_flexures_ends_at_the_tip() -> None:
+    """The rigid piece behind the last flexure is drawn, too."""
+    rod = sr.load_model(sr.PccArm(segment_lengths=(0.4,), muscle_azimuths=(), chain="flexures", hinges=4))
+    placed = robot_data(sr.solve_equilibrium(rod, ()), 1.0)["placed"]
+    assert np.allclose(np.reshape(placed[-1]["pose"], (4, 4))[:3, 3], (0.0, 0.0, 0.4), atol=1e-9)

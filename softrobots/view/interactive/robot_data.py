@@ -60,7 +60,7 @@ class ChainFrames:
                 joints = [self.of_joint[name] for name in row.joint_names if name in self.of_joint]
                 numbers = self.of_section.setdefault(row.name, [min(joints) - 1])
                 numbers[0] = place(numbers[0], segment, 0.0) if number == 0 else self.of_section[rows[number - 1].name][-1]
-                if len(numbers) == 1:
+                if len(numbers) == 1 or (number == len(rows) - 1 and row.bends < row.length):
                     numbers.append(place(max(joints), segment, bounds[number + 1]))
 
     def of_segment(self, segment: int) -> tuple[list[int], FloatArray]:
