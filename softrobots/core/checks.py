@@ -158,12 +158,15 @@ def positive_integer(name: str, value: Any, most: int | None = None) -> int:
 
 
 def unit_vector(name: str, value: Any) -> FloatArray:
-    """Return the unit vector in the direction of `value`, shape (3,); raise ParameterError for zero or invalid vectors."""
+    """Return the unit vector in the direction of `value`, shape (3,); raise ParameterError for zero or invalid vectors.
+
+    A vector of length 1 up to rounding is returned as it is: a unit vector that is written and read again stays the same.
+    """
     vector = finite_array(name, value, (3,))
     length = float(np.linalg.norm(vector))
     if length == 0.0:
         raise ParameterError(name, value, "different from zero")
-    return np.asarray(vector / length)
+    return vector if abs(length - 1.0) <= 4.0 * np.finfo(float).eps else np.asarray(vector / length)
 
 
 def choice(name: str, value: Any, options: Sequence[str]) -> str:
