@@ -197,3 +197,24 @@ def test_many_obstacles_are_shown_in_one_line() -> None:
     assert repr(room).endswith(", 4 more)")
     assert repr(sr.Environment(self_contact=True)) == "Environment(self_contact)"
     assert repr(sr.Mesh(np.random.default_rng(1).normal(size=(40, 3)), hull=True)).endswith(" rows>)")
+
+
+@law("Environment", "Sphere", "HalfSpace", "Box", "CompiledModel.equilibria")
+@given(angle=st.floats(-3.0, 3.0), weight=st.floats(0.0, 30.0))
+@settings(max_examples=6, deadline=None)
+def test_compiled_equilibria_in_contact_turn_with_the_world(angle: float, weight: float) -> None:
+    """Obstacles, on one side of the arm, and motor 1 turned about the vertical: the same springs to 1e-9, forces turned."""
+    arm, turn = sr.load_model(sr.InflatableArm()), Rotation.from_rotvec([0.0, 0.0, angle]).as_matrix()
+    solver, found = sr.compile(arm, backend="python"), list[Any]()
+    for about in (np.eye(3), turn):
+        obstacles = [
+            sr.HalfSpace(about @ (-1.0, 0.0, 0.0), -1.0),
+            sr.Box((0.3, 0.2, 0.1), about @ (0.9, 0.05, 0.5), about),
+            sr.Sphere(0.1, about @ (0.5, 0.04, 0.35)),
+        ]
+        motors = (angle if about is turn else 0.0, 0.9, -0.4)
+        found.append(solver.equilibria(motors, [(0.0, 0.0, -weight)], environment=sr.Environment(obstacles)))
+        assert found[-1].certified.all()
+    still, turned = found
+    assert np.abs(turned.q_springs - still.q_springs).max() < 1e-9
+    assert np.abs(turned.obstacle_forces - still.obstacle_forces @ turn.T).max() < 1e-9 * max(weight, 1.0) * 10.0

@@ -132,6 +132,7 @@ PAGES = {
             "softrobots.compiled.statuses.Status",
             *(f"softrobots.compiled.run.results.{name}" for name in ("CompiledEquilibrium", "CompiledLoadEstimate")),
             *(f"softrobots.compiled.run.results.{name}" for name in ("EquilibriumBatch", "LoadBatch", "MotorBatch")),
+            "softrobots.compiled.run.contact_batches.ContactBatch",
             *_top("compiled.sweeps"),
         ),
     ),

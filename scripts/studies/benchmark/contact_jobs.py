@@ -7,7 +7,7 @@ import dataclasses
 import math
 from collections.abc import Mapping, Sequence
 from functools import lru_cache, partial
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -20,9 +20,10 @@ from softrobots.export.mjcf_contact import steadying_armature
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.statics.equilibrium_result import Equilibrium
-from studies.benchmark.arm_baselines import GENERAL, MUJOCO, MUJOCO_ANY
+from studies.benchmark.arm_baselines import GENERAL, MUJOCO, MUJOCO_ANY, batch_name
 from studies.benchmark.cases import ROD_LENGTH, LoadCases, arm, random_forces, rod
 from studies.benchmark.comparison import Comparison, Outcome, Settings, figure
+from studies.benchmark.compiled_solvers import compiled
 from studies.benchmark.measurement import Workload, require_agreement
 from studies.benchmark.mujoco_settling import DAMPINGS, LARGE_STEPS, TIME_STEPS, SettlingArm, require_mujoco
 from studies.benchmark.results import AT_LEAST, AT_MOST, Row
@@ -42,6 +43,7 @@ _TIP_FORCE = 0.05  # on the tip of the rod [N]
 _ACROSS = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))  # turns z to y
 _PEG, _PEG_LENGTH = 0.01, 0.3  # radius and length of a peg [m]
 _TUNED = 8  # cases that the simulator is tuned on, at most a fifth of all
+_BATCH = batch_name("numba")
 _CHECKED = 10  # cases whose forces are compared before anything is timed
 
 
@@ -149,6 +151,7 @@ def contact(settings: Settings) -> Outcome:
     for scene in (leaning_arm(settings.singles), lying_rod(max(2, settings.singles // 20), 3 if settings.quick else SECTIONS)):
         comparison = Comparison(settings, scene.name)
         comparison.add(GENERAL, partial(_ours, scene))
+        comparison.add(_BATCH, partial(_batch, scene))
         for name in (AS_EXPORTED, LOOSELY, MUJOCO, MUJOCO_ANY):
             comparison.add(name, partial(_settling, name, settings, scene, notes))
         comparison.run()
@@ -156,12 +159,30 @@ def contact(settings: Settings) -> Outcome:
         rows.append(dataclasses.replace(figure(scene.name, GENERAL, "s", values, AT_MOST, scene.target), clock="CPU"))
         rows.append(comparison.cheaper(scene.name, GENERAL, AS_EXPORTED, AT_LEAST, 20.0))
         rows += [comparison.cheaper(scene.name, GENERAL, name) for name in (LOOSELY, MUJOCO, MUJOCO_ANY)]
+        rows += [comparison.cheaper(scene.name, _BATCH, name, AT_LEAST, 20.0) for name in (AS_EXPORTED, LOOSELY)]
     return Outcome(rows, notes=notes)
 
 
 def _ours(scene: Scene) -> Workload:
     pairs = list(zip(*scene.cases, strict=True))
     return Workload(len(pairs), lambda: [scene.solve(scene.ours, *pair) for pair in pairs])
+
+
+def _batch(scene: Scene) -> Workload:
+    """Compiled equilibria of MuJoCo's robot, each from rest; forces are those of our solver.
+
+    Raises:
+        SoftRobotsError: If they are not.
+    """
+    options: Any = {"gravity": scene.gravity if any(scene.gravity) else None, "environment": scene.environment}
+    solve: Any = partial(compiled(scene.theirs, "numba").equilibria, *scene.cases, **options)
+    some = scene.cases.first(_CHECKED)
+    found = solve().obstacle_forces[: len(some.forces)]
+    expected = np.array(
+        [stacked(forces_of(scene.solve(scene.theirs, *case)), scene.environment.names) for case in zip(*some, strict=True)]
+    )
+    require_agreement(_BATCH, found, expected, 1e-9 * float(np.abs(expected).max()), "N")
+    return Workload(len(scene.cases.forces), solve)
 
 
 def _settling(name: str, settings: Settings, scene: Scene, notes: list[str]) -> Workload:

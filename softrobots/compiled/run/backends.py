@@ -133,10 +133,19 @@ class NumbaRun(Run):
         """
         if importlib.util.find_spec("numba") is None:
             raise MissingDependency("numba", "fast")
-        functions = re.sub(r"^def ", f"{_JIT}def ", program.text + "\n\n" + program.lane_text, flags=re.MULTILINE)
+        functions = _decorated(program.text + "\n\n" + program.lane_text)
         functions = re.sub(r"^([A-Z_0-9]+) = (\(.*\))$", r"\1 = np.array(\2)", functions, flags=re.MULTILINE)
         head, rest = functions.split('"""\n', 1)  # the docstring stays first
         super().__init__(program, _module(f'{head}"""\n\n{_NUMBA_HEAD}\n{rest}'))
+
+
+def jitted(constants: str, functions: str) -> ModuleType:
+    """Return functions of the package as numba compiles them, from the text of their constants and their own."""
+    return _module(f"{_NUMBA_HEAD}from math import copysign, cos, sin\n\n{constants}\n\n\n{_decorated(functions)}\n")
+
+
+def _decorated(functions: str) -> str:
+    return re.sub(r"^def ", f"{_JIT}def ", functions, flags=re.MULTILINE)
 
 
 def _module_of(code: Any, **functions: Callable[[Any], Any]) -> ModuleType:

@@ -13,6 +13,7 @@ from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
+from softrobots.compiled.run.contact_batches import ContactSolver
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
@@ -44,6 +45,7 @@ class CompiledStatics:
         self._motors = model.n_motors
         run = self._run(False)
         self._settle, self._size, self._layout = run.settle, run.program.size, run.layout
+        self._touching: ContactSolver | None = None  # the solver in contact, once it is made
         self._heavy: Any = None  # the same of the code with weight, once it is made
         self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
@@ -228,7 +230,9 @@ class CompiledStatics:
             )
         return equilibrium
 
-    def equilibria(self, q_motors: Any, forces: Any, *, gravity: Any = None, threads: int = 1) -> EquilibriumBatch:
+    def equilibria(
+        self, q_motors: Any, forces: Any, *, gravity: Any = None, threads: int = 1, environment: Any = None
+    ) -> EquilibriumBatch:
         """Find the equilibria of many cases, each from rest.
 
         Args:
@@ -236,12 +240,17 @@ class CompiledStatics:
             forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             threads: Number of threads; more than one speeds up numba only.
+            environment: Obstacles that the robot touches without friction, or a sequence of environments, one a case, as
+                `[env.at(way) for way in ways]`. For robots of joints with linear springs, without meshes and self-contact.
 
         Returns:
-            One row a case. The status tells which cases failed; a failed case does not affect others.
+            One row a case. The status tells which cases failed; a failed case does not affect others. With an environment it
+            is a `ContactBatch`.
 
         Raises:
-            ParameterError: If a shape differs, gravity is not finite, or the number of threads is not positive.
+            ParameterError: If a shape differs, gravity is not finite, the number of threads is not positive, or robot or
+                obstacles are not compiled.
+            DescriptionError: If the robot has nothing to touch obstacles with.
         """
         run = self._run(gravity is not None)
         rows = self._model.actuators.in_order(q_motors, "q_motors")
@@ -249,6 +258,10 @@ class CompiledStatics:
         down = gravity_vector(gravity)
         bad = unusable(motors, loads) | self._actuation.unsuited(motors)
         motors, loads = without(motors, bad, self._model.relaxed_motors), without(loads, bad)
+        if environment is not None:
+            wrenches = np.hstack([loads, np.tile(down, (len(loads), 1))])
+            self._touching = self._touching or ContactSolver(self._model, self._unknowns, self._backend)
+            return self._touching.settle(motors, wrenches, bad, environment, threads)
         layout = run.layout
         inputs = [(layout.force, loads), (layout.gravity, down[None]), *self._actuation.rows(motors, layout)]
         results = [(layout.unknown, layout.unknowns), (layout.tip, 3), (layout.single("error"), 1)]
