@@ -32,6 +32,8 @@ def parser() -> argparse.ArgumentParser:
     help_text = "pairs of hinges, flexures or sections (%(default)s)"
     result.add_argument("--count", type=int, default=30, metavar="N", help=help_text)
     result.add_argument("--duration", type=float, default=10.0, metavar="T", help="of the motion [s] (%(default)g)")
+    help_text = "steps of this length, of second order [s] (chosen by the error)"
+    result.add_argument("--time-step", type=float, metavar="H", help=help_text)
     return result
 
 
@@ -42,7 +44,7 @@ def reference(rod: Any, force: float, duration: float) -> np.ndarray:
     return np.asarray(rod.tips(rod.equilibrium((force, 0.0)), duration, round(duration / ROW), int(np.ceil(ROW / step))))
 
 
-def off(rod: Any, form: str, count: int, force: float, path: np.ndarray) -> tuple[float, float]:
+def off(rod: Any, form: str, count: int, force: float, path: np.ndarray, time_step: float | None) -> tuple[float, float]:
     """Mean distance of the tip of one of our chains from a path [m], and seconds of the processor for a second of motion."""
     model = sr.load_model(
         sr.PccArm(
@@ -56,6 +58,8 @@ def off(rod: Any, form: str, count: int, force: float, path: np.ndarray) -> tupl
     options: dict[str, Any] = {
         "start": start, "gravity": gravity, "damping_time": rod.retardation, "output_step": ROW,
     }  # fmt: skip
+    if time_step is not None:
+        options |= {"time_step": time_step, "order": 2}
     solver.simulate(ROW, (), **options)  # compiles
     began = time.process_time()
     tips = solver.simulate(duration, (), **options).tip_position[:, [0, 2]]
@@ -65,10 +69,15 @@ def off(rod: Any, form: str, count: int, force: float, path: np.ndarray) -> tupl
 def main(argv: list[str] | None = None) -> int:
     """Print the table and return the exit status."""
     args = parser().parse_args(argv)
-    return exit_status(lambda: _table(positive_integer("count", args.count), positive_number("duration", args.duration, "s")))
+
+    def run() -> None:
+        step = None if args.time_step is None else positive_number("time_step", args.time_step, "s")
+        _table(positive_integer("count", args.count), positive_number("duration", args.duration, "s"), step)
+
+    return exit_status(run)
 
 
-def _table(count: int, duration: float) -> None:
+def _table(count: int, duration: float, step: float | None) -> None:
     from tests.support.planar_rod import PlanarRod
 
     steel = PlanarRod(0.6, 0.8e-3, 200e9, 7850.0, gravity=(0.0, -9.81))
@@ -80,7 +89,8 @@ def _table(count: int, duration: float) -> None:
             fine = dataclasses.replace(rod, retardation=damping, bends=bends, stretches=min(rod.stretches, most))
             path, aside = reference(fine, force, duration), fine.tip(fine.equilibrium((force, 0.0)))[0]
             coarse = reference(dataclasses.replace(fine, bends=bends - 1), force, duration)
-            found = {form: off(dataclasses.replace(rod, retardation=damping), form, count, force, path) for form in FORMS}
+            damped = dataclasses.replace(rod, retardation=damping)
+            found = {form: off(damped, form, count, force, path, step) for form in FORMS}
             cells = [f"{1e3 * error:.2g} mm" for error, _ in found.values()]
             cells.append(f"{1e3 * np.linalg.norm(path - coarse, axis=1).mean():.1g} mm")
             words = f"{1e3 * damping:g} ms" if damping else "none"

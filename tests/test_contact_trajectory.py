@@ -166,3 +166,11 @@ def test_an_interrupted_path_ends_where_it_was(start: sr.Equilibrium, monkeypatc
 def test_a_start_with_other_motors_is_refused(start: sr.Equilibrium) -> None:
     with pytest.raises(sr.ParameterError, match="the motors of the first row"):
         sr.follow_contact(start.model, [[0, 0.8, -0.4]] * 2, WEIGHT, environment=WALL, friction=0.1, start=start)
+
+
+def test_a_start_under_another_load_is_refused(start: sr.Equilibrium) -> None:
+    """Also one among other obstacles: the first row would be another equilibrium, with friction that nothing explains."""
+    moved = sr.Environment([sr.HalfSpace((-1, 0, 0), offset=-1.01, name="wall")])
+    for load, environment in (((0, 0, -25), WALL), (WEIGHT, moved)):
+        with pytest.raises(sr.ParameterError, match="in balance under the load"):
+            sr.follow_contact(start.model, start.q_motors, load, environment=environment, friction=0.1, start=start)

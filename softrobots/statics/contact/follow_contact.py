@@ -24,6 +24,7 @@ from softrobots.statics.equilibrium_result import Equilibrium, check_same_model
 from softrobots.statics.loads import Load
 
 _JUMP = 1e-2  # way of the springs beyond which overdamped motion is a jump [rad]
+_MOVES = 1e-6  # way of the springs within which a start is the equilibrium of the first row [rad]
 
 
 def follow_contact(
@@ -70,7 +71,7 @@ def follow_contact(
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range, rows differ in number, `start` has
-            other motors than the first row, or the robot has dry friction of its own.
+            other motors than the first row or is out of balance there, or the robot has dry friction of its own.
         NameNotFound: If a frame does not exist.
         EquilibriumNotFound: If there is no equilibrium at the first parameter, or the robot comes to no rest; `best` is then
             the path so far.
@@ -221,6 +222,9 @@ def _first(course: Course, friction: float, start: Equilibrium | None) -> Rest:
             raise ParameterError("start", start.q_motors.tolist(), requirement)
         here = start
     rest = at_rest(unloaded if start is None else given, here, friction)
+    if start is not None and rest is not None and change(given.model, rest.q_springs, start.q_springs) > _MOVES:
+        requirement = "in balance under the load and among the obstacles of the first row: there its springs move"
+        raise ParameterError("start", start.q_springs.tolist(), requirement)
     if rest is not None and start is None:
         loading = _Driven(lambda share: given._replace(load=given.load.scaled(share)), lambda _: course.parameter(0.0), True)
         rest = ContactWalk(loading).go(rest, 0.0)
