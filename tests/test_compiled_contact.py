@@ -122,7 +122,7 @@ def test_numba_finds_the_same_in_threads(arm: sr.SoftModel) -> None:
 @pytest.mark.shortened(200, 2000)
 @pytest.mark.parametrize("name", ["arm", "two_hinges"])
 def test_random_arms_among_random_obstacles_are_in_balance(name: str, cases: int) -> None:
-    """Every compiled answer is one of the plain solver, started from there: springs to 1e-9, forces to 1e-7 of the load.
+    """Every compiled answer is one of the plain solver, started from there: springs to 1e-9, forces to 1e-7 of the largest.
 
     Less than 5 % are handed over, and less than 2 % are others than the plain solver finds from rest.
     """
@@ -130,7 +130,7 @@ def test_random_arms_among_random_obstacles_are_in_balance(name: str, cases: int
     model = family.robot()
     body = PlainBody(PlainStatics(model))
     drawn = [draw(family, body, 0, number) for number in range(cases)]
-    motors, forces = (np.concatenate([getattr(case, name) for case, _ in drawn]) for name in ("motors", "forces"))
+    motors, forces = (np.concatenate([getattr(case, column) for case, _ in drawn]) for column in ("motors", "forces"))
     firsts = [next(iter(environment)) for _, environment in drawn]
     scenes = [
         sr.Environment([replace(one, name="one"), replace(other, name="other")])

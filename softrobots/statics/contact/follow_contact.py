@@ -209,25 +209,28 @@ def _first(course: Course, friction: float, start: Equilibrium | None) -> Rest:
     """The robot at rest at the first row.
 
     Raises:
+        ParameterError: If `start` is of another model, has other motors than the first row or is out of balance there.
         EquilibriumNotFound: If there is no equilibrium that holds.
     """
     given = course.at(0.0)
-    unloaded = given._replace(load=given.load.scaled(0.0))
     if start is None:
         here = solve_equilibrium(given.model, given.q_motors, environment=given.environment)
+
+        def loaded(share: float) -> Given:
+            return given._replace(load=given.load.scaled(share))
+
+        rest = at_rest(loaded(0.0), here, friction)
+        if rest is not None:
+            rest = ContactWalk(_Driven(loaded, lambda _: course.parameter(0.0), True)).go(rest, 0.0)
     else:
         check_same_model(given.model, start, "start")
         if not np.allclose(start.q_motors, given.q_motors, rtol=1e-9, atol=1e-9):
             requirement = f"an equilibrium with the motors of the first row, {given.q_motors.tolist()}"
             raise ParameterError("start", start.q_motors.tolist(), requirement)
-        here = start
-    rest = at_rest(unloaded if start is None else given, here, friction)
-    if start is not None and rest is not None and change(given.model, rest.q_springs, start.q_springs) > _MOVES:
-        requirement = "in balance under the load and among the obstacles of the first row: there its springs move"
-        raise ParameterError("start", start.q_springs.tolist(), requirement)
-    if rest is not None and start is None:
-        loading = _Driven(lambda share: given._replace(load=given.load.scaled(share)), lambda _: course.parameter(0.0), True)
-        rest = ContactWalk(loading).go(rest, 0.0)
+        here, rest = start, at_rest(given, start, friction)
+        if rest is not None and change(given.model, rest.q_springs, start.q_springs) > _MOVES:
+            requirement = "in balance under the load, obstacles and friction of the first row: there its springs move"
+            raise ParameterError("start", start.q_springs.tolist(), requirement)
     if rest is None:
         raise EquilibriumNotFound(
             "there is no equilibrium that holds at the first parameter", best=here, residual=here.residual, iterations=0
