@@ -359,13 +359,66 @@ def test_a_result_names_no_other_file(tmp_path: Path) -> None:
         sr.load_result(file)
 
 
+# --- Linear models
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_linear_model_at_rest_is_the_slope_of_solved_equilibria(name: str) -> None:
+    """Tip and motor torques by motors and by a force at the tip, against fourth-order differences of equilibria in contact."""
+    found = leaning(name)
+    arm, linear, m = found.model, sr.linearize(found.model, found), 3
+    n = len(linear.state_names) // 2
+    assert n == m + arm.n_springs - len(found.contacts)
+    assert set(linear.state_names[:n]) <= {*arm.motor_joints, *arm.spring_joints}
+    assert linear.A.shape == (2 * n, 2 * n)
+    assert len(linear.state_units) == 2 * n
+    force = slice(linear.input_names.index("tip_force_x"), None)
+    by_inputs = np.column_stack([linear.A[n + m :, :m], linear.B[n + m :, force]])  # of what the springs' accelerations have
+    resting = -np.linalg.solve(linear.A[n + m :, m:n], by_inputs)
+    outputs = np.column_stack([linear.C[:, :m], linear.D[:, force]]) + linear.C[:, m:n] @ resting
+
+    def moved(inputs: np.ndarray) -> np.ndarray:
+        options = {"gravity": sr.EARTH_GRAVITY, "environment": found.environment, "q_springs0": found.q_springs}
+        there = sr.solve_equilibrium(arm, MOTORS + inputs[:3], FORCE + 50.0 * inputs[3:], **options, tolerance=1e-13)
+        return np.concatenate([there.tip_position, there.motor_torques])
+
+    differences = fourth_order(moved, np.zeros(6), 1e-3) / np.repeat([1.0, 50.0], 3)
+    for rows, of in ((outputs[:3], slice(0, 3)), (outputs[6:], slice(3, 6))):
+        for part in (slice(0, 3), slice(3, 6)):
+            expected = differences[of, part]
+            assert np.abs(rows[:, part] - expected).max() < 1e-7 * np.abs(expected).max()
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_a_linear_model_in_contact_rings_as_the_modes(name: str) -> None:
+    """Modes go by an orthonormal basis of the motions that contacts leave, the linear model by some of the springs."""
+    found = leaning(name)
+    arm, m = found.model, 3
+
+    def same(found: np.ndarray, expected: np.ndarray) -> None:
+        assert len(found) == len(expected)
+        apart = np.abs(found[:, None] - expected)
+        assert max(apart.min(axis=0).max(), apart.min(axis=1).max()) < 1e-8 * np.abs(expected).max()
+
+    options: dict[str, Any] = {"damping_time": 0.02, "mass_damping": 0.3}
+    linear = sr.linearize(arm, found, **options)
+    n = len(linear.state_names) // 2
+    own = np.r_[m:n, n + m : 2 * n]
+    held = sr.vibration_modes(arm, found, **options)
+    same(np.linalg.eigvals(linear.A[np.ix_(own, own)]), held.eigenvalues)
+    servos = np.array([900.0, 700.0, 500.0])
+    options["rotor_inertia"] = 0.05
+    linear = sr.linearize(arm, found, motors="torque", **options)
+    closed = linear.A - linear.B[:, :m] @ (servos[:, None] * linear.C[6 : 6 + m])
+    same(np.linalg.eigvals(closed), sr.vibration_modes(arm, found, servo_stiffness=servos, **options).eigenvalues)
+
+
 # --- Refusals
 
 
 def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
     found = leaning("wall")
     refused: dict[str, Any] = {
-        "linear model": lambda: sr.linearize(found.model, found),
         "simulation": lambda: sr.simulate(found.model, 0.1, MOTORS, start=found),
         "by parameters": lambda: sr.sensitivity(found.model, found, "stiffness"),
     }
@@ -376,7 +429,7 @@ def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
         found.model, MOTORS, FORCE, gravity=sr.EARTH_GRAVITY, environment=found.environment, friction=0.3, parameters=[0.0]
     ).equilibria
     assert {contact.status for contact in rubs.contacts} <= {"sticks", "slips"}
-    for call in (sr.compliance, sr.elastostatic_jacobian, sr.contact_sensitivity, sr.vibration_modes):
+    for call in (sr.compliance, sr.elastostatic_jacobian, sr.contact_sensitivity, sr.vibration_modes, sr.linearize):
         with pytest.raises(sr.ParameterError, match="one whose contacts stick, or have no friction"):
             call(found.model, rubs)
     with pytest.raises(sr.ParameterError, match="a ContactPath is saved with its friction"):

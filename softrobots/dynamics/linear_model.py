@@ -16,11 +16,10 @@ from softrobots.core.checks import FloatArray, choice, read_only
 from softrobots.core.errors import MissingDependency, ParameterError
 from softrobots.core.summary import Part, Summarised, Table, facts
 from softrobots.dynamics.motor_torque import MOTORS
-from softrobots.dynamics.small_motion import SmallMotion, mass_factor, small_motion
+from softrobots.dynamics.small_motion import SmallMotion, independent_motion, mass_factor, small_motion
 from softrobots.model.actuators import load_units
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model
-from softrobots.statics.loads import check_no_contact
 
 _GIVEN = {"N": "tension", "m": "motor", "Pa": "pressure"}  # what actuators of free length are given, by its unit
 _TIP = ("tip_x", "tip_y", "tip_z", "tip_turn_x", "tip_turn_y", "tip_turn_z")
@@ -44,7 +43,7 @@ class LinearModel(Summarised):
     D: FloatArray
     """Outputs by inputs, shape (p, m)."""
     state_names: tuple[str, ...]
-    """Actuators and elastic coordinates, then `<name>_rate` of each."""
+    """Actuators and elastic coordinates, but those that follow along contacts, then `<name>_rate` of each."""
     state_units: tuple[str, ...]
     """Unit of each."""
     input_names: tuple[str, ...]
@@ -105,6 +104,10 @@ def linearize(
     The force at the tip is an input of both. Turns of the tip are small, about the axes of the world. A muscle of given length
     is a motor, and what it exerts along its length is minus its tension; what the others are given are inputs.
 
+    In contact what is pressed stays pressed, as in `vibration_modes`: it slides without friction, or sticks. Each contact makes
+    one elastic coordinate follow the others, each one that sticks three, and these are no states
+    (`softrobots.dynamics.small_motion.independent_motion`). Where the robot touches without a force, nothing holds it.
+
     Args:
         model: The robot.
         equilibrium: An equilibrium of it.
@@ -117,16 +120,18 @@ def linearize(
         The linear model.
 
     Raises:
-        ParameterError: If an argument is out of range, the equilibrium belongs to another model or has obstacles, or torques
-            are to drive muscles whose lengths depend on each other.
+        ParameterError: If an argument is out of range, the equilibrium belongs to another model or has a contact that
+            slips or must as the motors move, or torques are to drive muscles whose lengths depend on each other.
         DescriptionError: If the description has no masses, or the robot more joints than Pinocchio supports.
     """
     check_same_model(model, equilibrium)
-    check_no_contact(equilibrium, "a linear model of motion (vibration_modes takes them)")
     driven = choice("motors", motors, MOTORS) == "torque"
     if driven and not model.actuators.independent:
         raise ParameterError("motors", motors, "'prescribed': more than three muscles of a segment have no independent lengths")
-    small = small_motion(model, equilibrium, damping_time=damping_time, mass_damping=mass_damping, rotor_inertia=rotor_inertia)
+    small, springs = independent_motion(
+        model,
+        small_motion(model, equilibrium, damping_time=damping_time, mass_damping=mass_damping, rotor_inertia=rotor_inertia),
+    )
     with one_blas_thread(2 * len(small.mass)):
         matrices = _driven(model, small) if driven else _prescribed(model, small)
     placed, units = model.motor_joints[: small.n_placed], model.actuators.units[: small.n_placed]
@@ -140,7 +145,10 @@ def linearize(
         motor_outputs, motor_output_units = torques, load_units(units)
     given = model.actuators.units[small.n_placed :]
     inputs = tuple(f"{name}_{_GIVEN[unit]}" for name, unit in zip(model.motor_joints[small.n_placed :], given, strict=True))
-    states, state_units = _with_rates((*placed, *model.spring_joints), (*units, *model.springs.units))
+    states, state_units = _with_rates(
+        (*placed, *(model.spring_joints[place] for place in springs)),
+        (*units, *(model.springs.units[place] for place in springs)),
+    )
     a, b, c, d = map(read_only, matrices)
     return LinearModel(
         equilibrium=equilibrium,

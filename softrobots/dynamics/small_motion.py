@@ -27,6 +27,8 @@ from softrobots.statics.contact.held import held_stiffness
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import frame_jacobian
 
+_DEPENDENT = 1e-9  # least part of a gradient across those before it, over the largest
+_FORCED = 1e-6  # motion of the springs against what contacts hold, relative to gradients
 _UNSYMMETRIC = 1e-3  # largest unsymmetric part of a stiffness with modes, over the least stiffness
 
 
@@ -96,6 +98,45 @@ def small_motion(
         momentum=columns(_momentum(model, equilibrium.q)),
         pressed=None if pressed is None else np.concatenate([pressed.by_motors, pressed.by_springs], axis=1)[:, kept],
     )
+
+
+def independent_motion(model: SoftModel, small: SmallMotion) -> tuple[SmallMotion, Any]:
+    r"""Return small motion in coordinates that contacts leave: actuators, and springs that the others follow.
+
+    With :math:`G \,\delta x = 0` for what contacts hold, :math:`\delta x = T \xi` with independent coordinates :math:`\xi` out
+    of `x` (Wehage and Haug, J. Mechanical Design 104, 1982, 247), and the matrices become :math:`T^T M T`, :math:`T^T D T`,
+    :math:`T^T K T`: contact forces do no work along `T`. The springs that follow are those that contacts load most.
+
+    Args:
+        model: The robot.
+        small: Its small motion.
+
+    Returns:
+        The small motion over `xi`, with nothing pressed, and the places of the springs in it, integers.
+
+    Raises:
+        ParameterError: If the springs cannot follow the actuators along the contacts.
+    """
+    if small.pressed is None:
+        return small, np.arange(model.n_springs)
+    from scipy.linalg import qr
+
+    m, held = small.n_placed, small.pressed
+    upper, order = qr(held[:, m:] / np.sqrt(model.stiffness), mode="r", pivoting=True)
+    sizes = np.abs(np.diagonal(upper))
+    rank = int(np.sum(sizes > _DEPENDENT * sizes.max(initial=0.0)))
+    free = np.sort(order[rank:])
+    kept, following = np.concatenate([np.arange(m), m + free]), m + order[:rank]
+    moves = np.zeros((held.shape[1], len(kept)))
+    moves[kept] = np.eye(len(kept))
+    moves[following] = -np.linalg.lstsq(held[:, following], held[:, kept])[0]
+    if np.abs(held @ moves).max(initial=0.0) > _FORCED * np.abs(held).max(initial=0.0):
+        raise ParameterError(
+            "equilibrium", "contacts that the actuators move", "one whose springs can follow along its contacts"
+        )
+    mass, damping, stiffness = (moves.T @ matrix @ moves for matrix in (small.mass, small.damping, small.stiffness))
+    by_tension, tip, momentum = moves.T @ small.by_tension, small.tip @ moves, small.momentum @ moves
+    return SmallMotion(m, mass, damping, stiffness, by_tension, tip, momentum), free
 
 
 def mass_factor(model: SoftModel, mass: FloatArray) -> FloatArray:
