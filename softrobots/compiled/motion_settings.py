@@ -14,8 +14,5 @@ MOTION_CORRECTIONS = 30
 LEAST_PART = 2.0**-12
 """Smallest part of a step of time."""
 
-KEPT_STEPS = 3
-"""Number of earlier middles of steps from which that of the next step is extrapolated."""
-
-EXTRAPOLATION = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 2.0, -1.0, 0.0, 3.0, -3.0, 1.0)
-"""Their weights, the last one first: a row for each number of equal steps before, from none on."""
+KEPT_DIFFERENCES = 8
+"""Number of backward differences of the middles of equal steps from which the next middle is extrapolated."""

@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from softrobots.compiled.chain.extrapolation import beyond_history, keep_history
 from softrobots.compiled.chain.motion_layout import MotionLayout
-from softrobots.compiled.motion_settings import KEPT_STEPS
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.complex_numbers import ComplexScalar, parts_of
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
@@ -61,12 +61,7 @@ def _guess(layout: MotionLayout, block: Block) -> Block:
     position, velocity = (block.load(place, "i") for place in (layout.position, layout.velocity))
     beyond: list[Scalar] = []
     for stage, share in enumerate(STAGES):
-        coasting = position + h * velocity * share
-        one: Scalar = 0.0
-        for place in range(KEPT_STEPS):
-            earlier = block.load(layout.history + (2 * place + stage) * n, "i")
-            one = one + (earlier - coasting) * block.load(layout.weights + place)
-        beyond.append(one)
+        beyond.append(beyond_history(layout, block, stage, position + h * velocity * share))
     for stage, row in enumerate(FROM_SQUARES):
         block.store(layout.stages + stage * n, _weighted(row, beyond) / (h * h), "i")
     return block
@@ -92,11 +87,7 @@ def _finish(layout: MotionLayout, block: Block) -> Block:
     beyond = _weighted([0.5 * (1.0 - share) for share in STAGES], accelerations)
     block.store(layout.position, position + h * (velocity + h * beyond), "i")
     block.store(layout.velocity, velocity + h * 0.5 * (accelerations[0] + accelerations[1]), "i")
-    for stage in range(2):
-        block.store(layout.history + stage * n, stage_values(layout, block, stage, base="i")[0], "i")
-        for place in range(1, KEPT_STEPS):
-            earlier = block.load(layout.history + (2 * place - 2 + stage) * n, "i")
-            block.store(layout.history + (2 * place + stage) * n, earlier, "i")
+    keep_history(layout, block, [stage_values(layout, block, stage, base="i")[0] for stage in range(2)])
     return block
 
 

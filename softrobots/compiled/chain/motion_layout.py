@@ -7,7 +7,7 @@ from functools import cached_property
 
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.motion_settings import KEPT_STEPS
+from softrobots.compiled.motion_settings import KEPT_DIFFERENCES
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.complex_numbers import ComplexScalar
 from softrobots.compiled.trace.expressions import Scalar
@@ -64,11 +64,13 @@ class MotionLayout:
     begin_velocity: int = field(init=False)
     """Their velocities there (n)."""
     history: int = field(init=False)
-    """The unknowns in the middle of the steps before, the last one first (`KEPT_STEPS`, n), or at both stages (.., 2, n)."""
+    """Backward differences of the middles of equal steps (`KEPT_DIFFERENCES`, n), or at both stages (.., 2, n)."""
+    sizes: int = field(init=False)
+    """The largest of each order in the step that was taken last (`KEPT_DIFFERENCES`)."""
     weights: int = field(init=False)
-    """Weights of those in the extrapolation (`KEPT_STEPS`)."""
+    """Weight of each in the extrapolation: 1 for those that are used (`KEPT_DIFFERENCES`)."""
     n_history: int = field(init=False)
-    """Number of those that are of equal steps."""
+    """Number of equal steps before."""
     last_step: int = field(init=False)
     """Length of these steps [s]."""
     motors_begin: int = field(init=False)
@@ -108,7 +110,9 @@ class MotionLayout:
         given = dict(motor_velocities=m, motor_accelerations=m, force=3, gravity=3, damping=damping)
         middle = dict(time_step=1, unknown=n, rate=n, acceleration=n, correction=k * n, tip=3)
         state = dict(position=n, velocity=n, begin_position=n, begin_velocity=n)
-        before = dict(history=KEPT_STEPS * k * n, weights=KEPT_STEPS, n_history=1, last_step=1)
+        before = dict(
+            history=KEPT_DIFFERENCES * k * n, sizes=KEPT_DIFFERENCES, weights=KEPT_DIFFERENCES, n_history=1, last_step=1
+        )
         path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1)
         search = dict(change=1, last_change=1, settled=1, failed=1)
         stages = dict.fromkeys(_OF_STAGES, (k - 1) * 2 * n)

@@ -10,9 +10,10 @@ Motors move along the parabola through their positions at the beginning, in the 
 
 from __future__ import annotations
 
+from softrobots.compiled.chain.extrapolation import beyond_history, choose_order, keep_history
 from softrobots.compiled.chain.gauss_step import gauss_blocks
 from softrobots.compiled.chain.motion_layout import MotionLayout
-from softrobots.compiled.motion_settings import KEPT_STEPS, MOTION_ROUNDING, MOTION_TOLERANCE
+from softrobots.compiled.motion_settings import MOTION_ROUNDING, MOTION_TOLERANCE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
 
@@ -21,6 +22,7 @@ def step_blocks(layout: MotionLayout) -> list[Block]:
     """Return the functions of an unknown `i`, that of a motor `i`, and the test of convergence."""
     guess, apply, finish = gauss_blocks(layout) if layout.in_stages else _midpoint_blocks(layout)
     return [
+        choose_order(layout),
         guess,
         apply,
         _judge(layout, Block("judge_corrections", "Write `SETTLED`: whether the corrections of a step have converged.")),
@@ -42,11 +44,7 @@ def _guess(layout: MotionLayout, block: Block) -> Block:
     """Extrapolate the middle: accelerations of stiff springs change their sign from step to step, middles hardly change."""
     h, velocity = block.load(layout.time_step), block.load(layout.velocity, "i")
     coasting = block.load(layout.position, "i") + h * 0.5 * velocity
-    beyond: Scalar = 0.0
-    for place in range(KEPT_STEPS):
-        earlier = block.load(layout.history + place * layout.unknowns, "i")
-        beyond = beyond + (earlier - coasting) * block.load(layout.weights + place)
-    acceleration = beyond * 4.0 / (h * h)
+    acceleration = beyond_history(layout, block, 0, coasting) * 4.0 / (h * h)
     block.store(layout.acceleration, acceleration, "i")
     return _place_middle(layout, block, acceleration)
 
@@ -85,15 +83,13 @@ def _judge(layout: MotionLayout, block: Block) -> Block:
 
 
 def _finish(layout: MotionLayout, block: Block) -> Block:
-    h, n = block.load(layout.time_step), layout.unknowns
+    h = block.load(layout.time_step)
     position, velocity, acceleration = (
         block.load(place, "i") for place in (layout.position, layout.velocity, layout.acceleration)
     )
     block.store(layout.position, position + h * (velocity + h * 0.5 * acceleration), "i")
     block.store(layout.velocity, velocity + h * acceleration, "i")
-    block.store(layout.history, block.load(layout.unknown, "i"), "i")
-    for place in range(1, KEPT_STEPS):
-        block.store(layout.history + place * n, block.load(layout.history + (place - 1) * n, "i"), "i")
+    keep_history(layout, block, [block.load(layout.unknown, "i")])
     return block
 
 

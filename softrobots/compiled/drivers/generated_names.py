@@ -30,8 +30,7 @@ TARGET_SIZE: int
 N_ERRORS: int
 LANES: int
 LANE_SIZE: int
-NUMBER_WEIGHTS: int
-WORKSPACE_SIZE: int
+NUMBER_WORKSPACE_SIZE: int
 
 # Places in the workspace, see `softrobots.compiled.chain.layout`.
 ACTUATORS: int
@@ -89,7 +88,6 @@ SHARE: int
 TIME_STEP: int
 TIP: int
 VELOCITY: int
-WEIGHTS: int
 WHOLE_STEP: int
 
 # Shape of the robot, see `softrobots.compiled.program.shape_program`.
@@ -151,6 +149,8 @@ place_turn: Callable[[Array, int, int, int, int, int], None]
 # Straight-line functions of motion.
 apply_correction: Callable[[Array, int], None]
 apply_correction_lanes: Callable[[Array, int], None]
+choose_order: Callable[[Array], None]
+choose_order_lanes: Callable[[Array], None]
 finish_unknown: Callable[[Array, int], None]
 finish_unknown_lanes: Callable[[Array, int], None]
 guess_unknown: Callable[[Array, int], None]

@@ -11,25 +11,13 @@ from softrobots.compiled.drivers.intrinsics import Array, fabs
 from softrobots.compiled.motion_settings import *
 
 
-def weigh_history(w: Array) -> None:
-    """Set the weights of the extrapolation; steps of another length do not count."""
-    if fabs(w[TIME_STEP] - w[LAST_STEP]) > 1e-9 * w[TIME_STEP]:
-        w[N_HISTORY] = 0.0
-    row = 0
-    for k in range(KEPT_STEPS):
-        if w[N_HISTORY] > k + 0.5:
-            row += KEPT_STEPS
-    for k in range(KEPT_STEPS):
-        w[WEIGHTS + k] = EXTRAPOLATION[row + k]
-    w[LAST_STEP] = w[TIME_STEP]
-
-
 def settle_middle(w: Array) -> bool:
     """Find the accelerations of a step; tell whether the corrections converge.
 
     The first correction takes the factors of the step before: those of the extrapolated point would have its forces, which are
     wrong where stiff springs ring.
     """
+    choose_order(w)
     for i in range(N):
         guess_unknown(w, i)
     if w[N_HISTORY] < 0.5:
@@ -74,7 +62,9 @@ def motion_step(w: Array) -> int:
         for i in range(N_MOTORS):
             place_motor(w, i)
         motion_prepare(w)
-        weigh_history(w)
+        if fabs(w[TIME_STEP] - w[LAST_STEP]) > 1e-9 * w[TIME_STEP]:
+            w[N_HISTORY] = 0.0
+            w[LAST_STEP] = w[TIME_STEP]
         if settle_middle(w):
             for i in range(N):
                 finish_unknown(w, i)

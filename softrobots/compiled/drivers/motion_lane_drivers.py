@@ -32,6 +32,7 @@ def lanes_to_settle(w: Array) -> float:
 
 def settle_middle_lanes(w: Array, n_history: int) -> None:
     """Find the accelerations of a step; mark the lanes that fail."""
+    choose_order_lanes(w)
     for i in range(N):
         guess_unknown_lanes(w, i)
     fill_lanes(w, LAST_CHANGE, 1e300)
@@ -54,8 +55,7 @@ def motion_step_lanes(w: Array, length: float, n_history: int) -> None:
     fill_lanes(w, TIME_STEP, length)
     fill_lanes(w, WHOLE_STEP, length)
     fill_lanes(w, SHARE, 0.5)
-    for k in range(KEPT_STEPS):
-        fill_lanes(w, WEIGHTS + k, EXTRAPOLATION[KEPT_STEPS * min(n_history, KEPT_STEPS) + k])
+    fill_lanes(w, N_HISTORY, n_history)
     for i in range(N):
         for lane in range(LANES):
             w[(BEGIN_POSITION + i) * LANES + lane] = w[(POSITION + i) * LANES + lane]

@@ -29,9 +29,10 @@ _REDUCE = "Inward pass: elimination of the torques at both stages."
 _INWARD = ("articulate", "resist", "reduce")
 
 _MOVE = """    start_move_SUFFIX(w)
-    for i in range(N):
+BEND    move_all_SUFFIX(w)
+"""
+_BEND = """    for i in range(N):
         bend_SUFFIX(w, i)
-    move_all_SUFFIX(w)
 """
 _ARTICULATE = """    start_articulate_SUFFIX(w)
     articulate_all_SUFFIX(w)
@@ -71,11 +72,11 @@ def motion_tip_SUFFIX(w: Array) -> None:
     finish_place_SUFFIX(w)'''
 
 
-def _control(in_stages: bool) -> str:
-    """Text of the functions that call the passes."""
+def _control(in_stages: bool, bends: bool) -> str:
+    """Text of the functions that call the passes; `bends`: whether joints turn."""
     evaluate, reduce = ("    resist_stages_SUFFIX(w)\n", "    reduce_all_SUFFIX(w)\n") if in_stages else (_MOVE, _RESIST)
     text = _CONTROL.replace("FACTOR", evaluate + _ARTICULATE + reduce).replace("CORRECT", evaluate + reduce)
-    return _AT_STAGES + text if in_stages else text
+    return (_AT_STAGES + text if in_stages else text).replace("BEND", _BEND if bends else "")
 
 
 def looped_motion(plan: MotionPlan) -> MotionParts:
@@ -95,6 +96,7 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
             record += kind.record
         for name, pass_calls in calls.items():
             pass_calls.append((kind.number, f"{name}_{kind.number}(w, AT[i], ROW[i], PLACE[i])"))
+    bends = any(unknowns.traced(row).kind == "turn" and unknowns.traced(row).moving for row in sequence)
     tables: dict[str, object] = {"FIRST": places.bounds, "COUNT": places.bounds + 1, "N_ELEMENTS": len(sequence)}
     tables |= {f"GROUP_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
     ordered = [sequence[group[0]] for group in motion_groups(unknowns)]
@@ -102,7 +104,7 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     frame = [
         _prepare(plan, places, len(ordered)),
         _start_move(places),
-        _bend(plan, places),
+        *([_bend(plan, places)] if bends else []),
         _start_articulate(plan, places),
         _start_resist(plan, places),
         _start_place(plan, places, len(ordered)),
@@ -112,7 +114,7 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     loops, lane_loops = (
         [
             *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
-            _control(in_stages).replace("_SUFFIX", suffix),
+            _control(in_stages, bends).replace("_SUFFIX", suffix),
         ]
         for suffix in ("", "_lanes")
     )

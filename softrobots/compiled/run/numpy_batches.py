@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.drivers.lane_drivers import Places, Rows
-from softrobots.compiled.motion_settings import EXTRAPOLATION, KEPT_STEPS, MOTION_CORRECTIONS
+from softrobots.compiled.motion_settings import MOTION_CORRECTIONS
 from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.settings import CHUNK, FORCE_PASSES, OBSERVABLE, PASSES
 from softrobots.compiled.statuses import Status
@@ -157,9 +157,8 @@ class MotionBatches:
             for step, length in enumerate(np.diff(grid).tolist()):
                 if step and abs(length - (grid[step] - grid[step - 1])) > 1e-9 * length:
                     n_history = 0
-                weights = EXTRAPOLATION[KEPT_STEPS * min(n_history, KEPT_STEPS) :][:KEPT_STEPS]
                 w[layout.time_step], w[layout.whole_step], w[layout.share] = length, length, 0.5
-                w[layout.weights : layout.weights + KEPT_STEPS] = weights
+                w[layout.n_history] = n_history
                 for k, place in enumerate((layout.motors_begin, layout.motors_middle, layout.motors_end)):
                     w[place : place + m] = list(motors[:, min(2 * step + k, motors.shape[1] - 1)].T)
                 w[layout.force : layout.force + 3] = list(forces[:, min(step, forces.shape[1] - 1)].T)
@@ -185,6 +184,7 @@ class MotionBatches:
         for i in range(layout.motors):
             functions.place_motor(w, i)
         functions.motion_prepare(w)
+        functions.choose_order(w)
         for i in range(layout.unknowns):
             functions.guess_unknown(w, i)
         w[layout.last_change] = np.full(len(failed), 1e300)
