@@ -146,6 +146,8 @@ class TimeLoad:
 
     def tip_forces(self, times: FloatArray) -> FloatArray:
         """Return the force on the tip at many times, shape (n,) [s], as shape (n, 3) [N]."""
+        if self.constant:
+            return np.full((len(times), 3), self._constant.get(self._tip, np.zeros(6))[:3])
         return np.array([self(time).get(self._tip, np.zeros(6))[:3] for time in times.tolist()]).reshape(-1, 3)
 
     @staticmethod

@@ -26,8 +26,8 @@ TIP_ERROR = 5e-4
 """Mean error of the tip at which rods are compared [m]."""
 ARM_STEP = 1e-3
 """Step of the inflatable arm by the midpoint rule [s]."""
-FOURTH_ORDER_STEPS = (10e-3, 5e-3, 2.5e-3)
-"""Steps of fourth order of the inflatable arm [s]."""
+FOURTH_ORDER_STEPS = (15e-3, 10e-3, 5e-3, 2.5e-3)
+"""Steps of fourth order of the inflatable arm [s]; the longest are about as far off as `ARM_STEP` by the midpoint rule."""
 
 _STEPS = (10e-3, 5e-3, 4e-3, 2.5e-3, 2e-3, 1.25e-3, 1e-3, 0.5e-3, 0.25e-3)  # tried for rods, the longest first [s]
 _LENGTH, _RADIUS, _YOUNG, _DENSITY, _PUSH = 0.4, 5e-3, 70e6, 1200.0, 0.1  # of a rod of TPU, SI units
@@ -132,7 +132,8 @@ def _arm(settings: Settings) -> Outcome:
                 _real_time(comparison, job, released.duration, 5000.0, f"{COMPILED}, batch"),
                 comparison.cheaper(job, COMPILED, PYTHON),
             ]
-        rows.append(comparison.cheaper(f"{job}, equal error", COMPILED, MUJOCO, AT_LEAST, 10.0))
+        bar = (AT_LEAST, 10.0) if order == 4 else ()  # ours that costs least against MuJoCo's that costs least
+        rows.append(comparison.cheaper(f"{job}, equal error", COMPILED, MUJOCO, *bar))
     return Outcome(rows, notes=notes)
 
 

@@ -41,7 +41,7 @@ class CompiledDynamics(CompiledStatics):
         """Generate and load the code; call `softrobots.compile` instead."""
         super().__init__(model, backend, locked_strains)
         self._motion_runs: dict[tuple[bool, int], Any] = {}
-        self._dampings: dict[tuple[float | None, float], FloatArray] = {}
+        self._dampings: dict[tuple[float | None, float], tuple[FloatArray, FloatArray, bool]] = {}
 
     def simulate(
         self,
@@ -102,7 +102,7 @@ class CompiledDynamics(CompiledStatics):
         else:
             taken = halve_to_tolerance(take, first_grid(rows, course.breaks, scheme), largest, scheme)
             facts["tip_error"] = None if taken.errors is None else float(taken.errors[0])
-        at_rows = replace(taken, rows=taken.rows[:, np.searchsorted(times, rows)])
+        at_rows = taken if times is rows else replace(taken, rows=taken.rows[:, np.searchsorted(times, rows)])
         down = None if gravity is None else tuple(gravity_vector(gravity).tolist())
 
         def again(steps: FloatArray, row_times: FloatArray) -> Motion:
@@ -271,16 +271,16 @@ class CompiledDynamics(CompiledStatics):
         alpha = non_negative_number("mass_damping", mass_damping, "1/s")
         beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
         if (beta, alpha) not in self._dampings:
-            self._dampings[beta, alpha] = damping_matrix(self._model, beta, alpha)
-        damping = self._dampings[beta, alpha]
-        strains = list(self._unknowns.strains)
-        own = damping[np.ix_(strains, strains)]
-        full = bool(np.any(own != np.diag(np.diag(own))))
+            whole, strains = damping_matrix(self._model, beta, alpha), list(self._unknowns.strains)
+            matrix = whole[np.ix_(strains, strains)]
+            coupled = bool(np.any(matrix != np.diag(np.diag(matrix))))
+            self._dampings[beta, alpha] = whole, matrix.ravel() if coupled else np.diag(matrix), coupled
+        damping, own, full = self._dampings[beta, alpha]
         if (full, order) not in self._motion_runs:
             program = make_motion_program(self._unknowns, full_damping=full, order=order)
             self._motion_runs[full, order] = make_run(program, self._backend)
         run = self._motion_runs[full, order]
-        return run, [(run.layout.damping, own.ravel() if full else np.diag(own)), (run.layout.gravity, down)], damping
+        return run, [(run.layout.damping, own), (run.layout.gravity, down)], damping
 
     def _first_state(self, course: Course, start: Any) -> tuple[FloatArray, FloatArray]:
         """Return unknowns and rates at time zero, each shape (n,), after the motors have begun to move."""

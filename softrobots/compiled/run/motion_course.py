@@ -38,8 +38,8 @@ def forces_of_steps(load: TimeLoad, grid: FloatArray) -> FloatArray:
 def motors_at(path: MotorPath, times: FloatArray, grid: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return motors and their rates at given times, each (n, n_motors); the rates as the steps of a grid have them."""
     if path.constant:
-        motors = np.tile(path(0.0), (len(times), 1))
-        return motors, np.zeros_like(motors)
+        motors = path(0.0)
+        return np.full((len(times), len(motors)), motors), np.zeros((len(times), len(motors)))
     step = np.maximum(np.searchsorted(grid, times) - 1, 0)
     ends = np.array([grid[step], 0.5 * (grid[step] + grid[step + 1]), grid[step + 1]])
     u0, middle, u1 = (path.at(row) for row in ends)

@@ -103,9 +103,8 @@ def take_one(
         run.put(w, place, values)
     rows, status, interrupted = np.full((1, len(times), 2 * n + 3), np.nan), Status.CERTIFIED, False
     rows[0, 0] = np.concatenate([*state, np.zeros(3)])  # even if no step is taken
-    stops = np.union1d(_stops(grid, course.kicks), np.arange(0, last, _CHUNK))
     try:
-        for first, end in itertools.pairwise(stops.tolist()):
+        for first, end in itertools.pairwise(sorted({*_stops(grid, course.kicks), *range(0, last, _CHUNK)})):
             part, within = grid[first : end + 1], _times_within(times, grid, first, end)
             motors, forces = motors_of_steps(course.path, part), forces_of_steps(course.load, part)
             out = run.flat(rows[0, within])
@@ -134,7 +133,7 @@ def take_batch(
     places = tuple(place for place, _ in given)
     most = min(4096, (_CASE_STEPS if cases.stand_still else _SAMPLES // 2) // len(grid))
     size = 16 * max(math.ceil(min(most, cases.count / threads) / 16), 1)
-    stops = _stops(grid, cases.kicks).tolist()
+    stops = sorted(_stops(grid, cases.kicks))
 
     def solve(case: int) -> None:
         rows = slice(case, min(case + size, cases.count))
@@ -158,10 +157,10 @@ def take_batch(
     return StepsTaken(grid, out, statuses)
 
 
-def _stops(grid: FloatArray, kicks: FloatArray) -> Any:
+def _stops(grid: FloatArray, kicks: FloatArray) -> set[int]:
     """Places of the grid between which no velocity of a motor jumps."""
     inside = kicks[(kicks > 0.0) & (kicks < grid[-1])]
-    return np.unique([0, *np.searchsorted(grid, inside).tolist(), len(grid) - 1])
+    return {0, *np.searchsorted(grid, inside).tolist(), len(grid) - 1}
 
 
 def _times_within(times: FloatArray, grid: FloatArray, first: int, end: int) -> slice:
