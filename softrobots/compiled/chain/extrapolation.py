@@ -1,4 +1,4 @@
-r"""Extrapolation of the middle of a step of time from those of the steps before, traced.
+r"""Extrapolation of the middle of a step of time from those of the steps before, and the changes by its corrections, traced.
 
 The polynomial through the last k middles of equal steps continues to the sum of their backward differences
 
@@ -36,13 +36,27 @@ def choose_order(layout: MotionLayout) -> Block:
 
 
 def beyond_history(layout: MotionLayout, block: Block, stage: int, coasting: Scalar) -> Scalar:
-    """Return how far the extrapolated middle of an unknown `i` is from where it coasts to; zero without steps before."""
+    """Return how far the extrapolated middle of an unknown `i` is from where it coasts to; zero without steps before.
+
+    Writes the scale of its changes, which are relative to where it coasts to, or to 1 rad or m.
+    """
     places = range(layout.history + stage * layout.unknowns, layout.sizes, _stages(layout) * layout.unknowns)
     last, *differences = (block.load(place, "i") for place in places)
+    if stage == 0:
+        block.store(layout.scale, 1.0 / larger(absolute(coasting), 1.0), "i")
     beyond = (last - coasting) * block.load(layout.weights)
     for k, difference in enumerate(differences, 1):
         beyond = beyond + difference * block.load(layout.weights + k)
     return beyond
+
+
+def compare_change(layout: MotionLayout, block: Block, moved: Sequence[Scalar]) -> None:
+    """Let the changes of an unknown `i` in the middle, or at both stages, count for the largest of the correction."""
+    change, scale = block.load(layout.change), block.load(layout.scale, "i")
+    for one in moved:
+        size = absolute(one) * scale
+        change = larger(change, if_less(size, 1e300, size, 1e300))  # also of NaN
+    block.store(layout.change, change)
 
 
 def keep_history(layout: MotionLayout, block: Block, middles: Sequence[Scalar]) -> None:

@@ -8,11 +8,11 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from softrobots.compiled.chain.extrapolation import beyond_history, keep_history
+from softrobots.compiled.chain.extrapolation import beyond_history, compare_change, keep_history
 from softrobots.compiled.chain.motion_layout import MotionLayout
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.complex_numbers import ComplexScalar, parts_of
-from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
+from softrobots.compiled.trace.expressions import Scalar
 from softrobots.dynamics.gauss import FROM_SQUARES, SECOND, SQUARES, STAGES, WEIGHTS
 
 
@@ -70,13 +70,11 @@ def _guess(layout: MotionLayout, block: Block) -> Block:
 def _apply(layout: MotionLayout, block: Block) -> Block:
     h, n = block.load(layout.time_step), layout.unknowns
     steps = [block.load(layout.correction + stage * n, "i") for stage in range(2)]
-    change: Scalar = block.load(layout.change)
+    moved: list[Scalar] = []
     for stage, step in enumerate(steps):
         block.store(layout.stages + stage * n, block.load(layout.stages + stage * n, "i") + step, "i")
-        size = larger(absolute(stage_values(layout, block, stage, base="i")[0]), 1.0)
-        moved = absolute(_weighted(SQUARES[stage], steps)) * (h * h) / size
-        change = larger(change, if_less(moved, 1e300, moved, 1e300))  # also of NaN
-    block.store(layout.change, change)
+        moved.append(_weighted(SQUARES[stage], steps) * (h * h))
+    compare_change(layout, block, moved)
     return block
 
 

@@ -83,8 +83,10 @@ class MotionLayout:
     """Length of the step that these are of, of which `time_step` may be a part [s]."""
     share: int = field(init=False)
     """A moment of that step: 0 at its beginning, 1 at its end."""
+    scale: int = field(init=False)
+    """What changes of the unknowns are multiplied by to compare them (n) [1/rad or 1/m]."""
     change: int = field(init=False)
-    """Largest change of an unknown in the middle of the step by the last correction, relative to 1 or its size."""
+    """Largest change of an unknown in the middle of the step by the last correction, by `scale`."""
     last_change: int = field(init=False)
     """The same of the correction before."""
     settled: int = field(init=False)
@@ -114,7 +116,7 @@ class MotionLayout:
             history=KEPT_DIFFERENCES * k * n, sizes=KEPT_DIFFERENCES, weights=KEPT_DIFFERENCES, n_history=1, last_step=1
         )
         path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1)
-        search = dict(change=1, last_change=1, settled=1, failed=1)
+        search = dict(scale=n, change=1, last_change=1, settled=1, failed=1)
         stages = dict.fromkeys(_OF_STAGES, (k - 1) * 2 * n)
         assign_places(self, m, **given, **middle, **state, **before, **path, **search, **stages, prepared=0)
 

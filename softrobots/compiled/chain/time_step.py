@@ -10,12 +10,12 @@ Motors move along the parabola through their positions at the beginning, in the 
 
 from __future__ import annotations
 
-from softrobots.compiled.chain.extrapolation import beyond_history, choose_order, keep_history
+from softrobots.compiled.chain.extrapolation import beyond_history, choose_order, compare_change, keep_history
 from softrobots.compiled.chain.gauss_step import gauss_blocks
 from softrobots.compiled.chain.motion_layout import MotionLayout
 from softrobots.compiled.motion_settings import MOTION_ROUNDING, MOTION_TOLERANCE
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
+from softrobots.compiled.trace.expressions import Scalar, if_less, larger
 
 
 def step_blocks(layout: MotionLayout) -> list[Block]:
@@ -53,10 +53,7 @@ def _apply(layout: MotionLayout, block: Block) -> Block:
     correction, h = block.load(layout.correction, "i"), block.load(layout.time_step)
     acceleration = block.load(layout.acceleration, "i") + correction
     block.store(layout.acceleration, acceleration, "i")
-    size = larger(absolute(block.load(layout.unknown, "i")), 1.0)
-    change = absolute(correction) * (h * h * 0.25) / size
-    finite = if_less(change, 1e300, change, 1e300)  # also of NaN
-    block.store(layout.change, larger(block.load(layout.change), finite))
+    compare_change(layout, block, [correction * (h * h * 0.25)])
     return _place_middle(layout, block, acceleration)
 
 
