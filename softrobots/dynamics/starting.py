@@ -52,6 +52,8 @@ def first_kick(path: MotorPath, rates: FloatArray) -> FloatArray | None:
         path: The motors over time.
         rates: Their velocities before, shape (n_motors,).
     """
+    if not path.kicks and not rates.any():
+        return None
     change: FloatArray = path.kicks.get(0.0, np.zeros(len(rates))) - rates
     slight = _APART * float(np.abs(rates).max(initial=_APART))
     return change if np.abs(change).max(initial=0.0) > slight else None

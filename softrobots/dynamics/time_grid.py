@@ -31,7 +31,9 @@ def refuse_too_short(name: str, interval: float, duration: float) -> None:
 
 def time_grid(end: float, step: float) -> FloatArray:
     """Return times from zero to the end, `step` apart, the last one nearer if need be, shape (n,) [s]."""
-    return np.append(step * np.arange(math.ceil(end / step - 1e-9)), end)
+    grid: FloatArray = step * np.arange(math.ceil(end / step - 1e-9) + 1.0)
+    grid[-1] = end
+    return grid
 
 
 def grid_of_rows(rows: FloatArray) -> FloatArray:

@@ -159,8 +159,8 @@ def take_batch(
 
 def _stops(grid: FloatArray, kicks: FloatArray) -> set[int]:
     """Places of the grid between which no velocity of a motor jumps."""
-    inside = kicks[(kicks > 0.0) & (kicks < grid[-1])]
-    return {0, *np.searchsorted(grid, inside).tolist(), len(grid) - 1}
+    inside = [time for time in kicks.tolist() if 0.0 < time < grid[-1]]
+    return {0, *np.searchsorted(grid, inside).tolist(), len(grid) - 1} if inside else {0, len(grid) - 1}
 
 
 def _times_within(times: FloatArray, grid: FloatArray, first: int, end: int) -> slice:
