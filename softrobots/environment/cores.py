@@ -9,9 +9,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.vectors import skew
 from softrobots.environment.capsules import RobotCapsule, robot_capsules
+from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel, check_model
 
 SAME_POINT = 1e-9
@@ -48,6 +49,11 @@ class Cores:
         self._numbers = self._numbers.tolist()
         ends = np.array([[one.start, one.end] for one in self.capsules]).reshape(-1, 2, 3)
         self._local = np.concatenate([ends, np.ones((self.count, 2, 1))], axis=2)
+        nothing = read_only(np.zeros((0, self._model.nv)))
+        self.no_rows = nothing, read_only(np.zeros(0))
+        """No row over the joints, shape (0, nv), and its weights."""
+        self.no_load = JointLoad(read_only(np.zeros(self._model.nv)), nothing, nothing, None, None, 0.0, 0.0)
+        """No load on the joints."""
         self.moves = self._motion()
         """1 where a joint coordinate moves a capsule, else 0, shape (n, nv)."""
         self.single_ends, numbers, moving = self._single_ends(model)
@@ -63,11 +69,10 @@ class Cores:
 
     def at(self, q: FloatArray) -> CorePlaces:
         """Return the cores at Pinocchio's configuration, shape (nq,)."""
-        pin.computeJointJacobians(self._model, self._data, q)
+        jacobian = pin.computeJointJacobians(self._model, self._data, q).reshape(6, self._model.nv)  # a copy
         placements = self._data.oMi
         transforms = np.array([placements[number].homogeneous for number in self._numbers])
         ends = (self._local @ transforms.take(self.carrier, 0).swapaxes(1, 2))[:, :, :3]
-        jacobian = self._data.J.copy().reshape(6, self._model.nv)
         return CorePlaces(ends, ends[:, 1] - ends[:, 0], jacobian, transforms)
 
     def _motion(self) -> FloatArray:
