@@ -84,8 +84,8 @@ def test_obstacles_of_each_case_and_their_order(arm: sr.SoftModel) -> None:
 
 
 def test_hard_and_bad_cases_are_told(arm: sr.SoftModel) -> None:
-    """Inside of two walls at once there is no way out to first order: the plain solver says so; NaN is no number."""
-    between = sr.Environment([WALL, sr.HalfSpace((1, 0, 0), offset=1.2)])
+    """Between two walls without a gap there is no way out: the plain solver says so; NaN is no number."""
+    between = sr.Environment([sr.HalfSpace((0, 0, 1)), sr.HalfSpace((0, 0, -1))])
     batch: Any = sr.compile(arm, backend="python").equilibria(MOTORS, [FORCE, (np.nan, 0, 0)], environment=between)
     assert batch.handed_over.tolist() == [True, False]
     assert batch.status.tolist() == [Status.UNSETTLED, Status.NOT_A_NUMBER]

@@ -66,6 +66,10 @@ class Cores:
         """Different ends at the base, with an end within their radius that no joint moves, and that end, both of shape (k,)."""
         self.base_radii = self.radii[self.end_capsules[self.bases]][:, None]
         """Radii of the latter, shape (k, 1) [m]."""
+        self.fixed = np.flatnonzero(~moving[self.single_ends])
+        """Different ends that no joint moves, shape (j,); none on a body beside the chain."""
+        self.fixed_points = self.at(pin.neutral(self._model)).ends.reshape(-1, 3)[self.single_ends][self.fixed]
+        """Where they are, shape (j, 3) [m]."""
 
     def at(self, q: FloatArray) -> CorePlaces:
         """Return the cores at Pinocchio's configuration, shape (nq,)."""

@@ -22,6 +22,7 @@ from softrobots.environment.cores import cores_of
 from softrobots.environment.environment import Environment, fixed_environment
 from softrobots.environment.obstacle_fields import obstacle_transforms
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
+from softrobots.environment.standing import check_base
 from softrobots.model.serial_chain import ChainJoint
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import solve_equilibrium
@@ -96,6 +97,7 @@ class ContactSolver:
             raise ParameterError("environment", f"{len(around)} environments", requirement)
         threads = positive_integer("threads", threads)
         bodies = np.array([bodies_of(one) for one in around])
+        check_base(self._model, around)
         springs, tips = np.tile(self._model.rest, (n, 1)), np.zeros((n, 3))
         pushes, told, done = np.zeros((n, 3 * bodies.shape[1])), np.zeros((n, 2)), np.zeros(n, dtype=np.bool_)
         given = self._chain, self._capsules, bodies, motors, loads, springs, tips, pushes, told, done

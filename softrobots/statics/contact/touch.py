@@ -16,6 +16,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Gaps, Surroundings
+from softrobots.environment.standing import standing_among
 from softrobots.model.coordinates import Point
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
@@ -101,7 +102,7 @@ class NearSurfaces:
         """Take the robot and its environment."""
         known = _KNOWN.by_model.get(model)
         if known is None or known[0] is not environment:
-            known = _KNOWN.by_model[model] = environment, Surroundings(model, environment)
+            known = _KNOWN.by_model[model] = environment, standing_among(model, environment)
         self._surroundings, self._reach = known[1], model.reach
 
     def at(self, q: FloatArray, point: Point, forces: ForceTable, near: float) -> Touch:
