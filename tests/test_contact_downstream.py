@@ -418,9 +418,10 @@ def test_a_linear_model_in_contact_rings_as_the_modes(name: str) -> None:
 
 def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
     found = leaning("wall")
+    felt = sr.estimate_load(found.model, MOTORS, found.motor_torques, environment=found.environment, gravity=sr.EARTH_GRAVITY)
     refused: dict[str, Any] = {
         "simulation": lambda: sr.simulate(found.model, 0.1, MOTORS, start=found),
-        "by parameters": lambda: sr.sensitivity(found.model, found, "stiffness"),
+        "of an estimate": lambda: sr.sensitivity(found.model, felt, "stiffness"),
     }
     for words, call in refused.items():
         with pytest.raises(sr.ParameterError, match=f"{words}.*takes no obstacles"):
