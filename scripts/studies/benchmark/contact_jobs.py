@@ -161,6 +161,7 @@ def contact(settings: Settings) -> Outcome:
             rows.append(dataclasses.replace(figure(scene.name, name, "s", values, AT_MOST, scene.target), clock="CPU"))
         rows.append(comparison.cheaper(scene.name, GENERAL, AS_EXPORTED, AT_LEAST, 20.0))
         rows += [comparison.cheaper(scene.name, GENERAL, name) for name in (LOOSELY, MUJOCO, MUJOCO_ANY)]
+        rows.append(comparison.cheaper(scene.name, _SINGLE, AS_EXPORTED, AT_LEAST, 20.0))
         rows += [comparison.cheaper(scene.name, _BATCH, name, AT_LEAST, 20.0) for name in (AS_EXPORTED, LOOSELY)]
     return Outcome(rows, notes=notes)
 

@@ -177,9 +177,9 @@ class _Driven:
         self.jumps: list[ContactJump] = []
         self.ended = ""
 
-    def step(self, place: float, here: Rest) -> Rest | None:
+    def step(self, place: float, here: Rest, small: bool = True) -> Rest | None:
         """Go to a place; None if there is no equilibrium that holds near the last one."""
-        return step(self._given_at(place), here)
+        return step(self._given_at(place), here, patient=small)
 
     def blocked(self, place: float, here: Rest) -> Rest | None:
         """Where a robot comes to rest that has no equilibrium near; None if jumps are not allowed.

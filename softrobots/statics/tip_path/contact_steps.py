@@ -152,7 +152,7 @@ class TargetWay:
         """What is given at motors."""
         return Given(self._model, motors, self._load, self._environment, self._surroundings)
 
-    def step(self, place: float, here: Rest) -> Rest | None:
+    def step(self, place: float, here: Rest, small: bool = True) -> Rest | None:
         """Put the tip to the target of a place; None if no small step of the robot does."""
         number = min(int(place), len(self._goals) - 2)
         goal = self._goals[number].between(self._goals[number + 1], place - number)
