@@ -71,6 +71,28 @@ def test_equilibria_are_those_of_the_plain_solver(arm: sr.SoftModel, scene: str)
     assert batch.residual[0] <= state.tolerance
 
 
+def test_a_single_case_is_that_of_the_batch(arm: sr.SoftModel) -> None:
+    """Certified, or an error with what was found; also after another environment, and where the plain solver takes it."""
+    solver, gravity = sr.compile(arm, backend="python"), (0, 0, -9.81)
+    for scene in ("wall", "capsule and wall", "wall"):
+        environment = sr.Environment(SCENES[scene])
+        batch: Any = solver.equilibria(MOTORS, [FORCE], gravity=gravity, environment=environment)
+        one: Any = solver.equilibrium(MOTORS, FORCE, gravity=gravity, environment=environment)
+        assert one.stable
+        assert np.array_equal(one.obstacle_forces, batch.obstacle_forces[0])
+        assert np.array_equal(one.q_springs, batch.q_springs[0])
+        assert np.array_equal(one.tip_position, batch.tip_positions[0])
+        assert one.residual == pytest.approx(batch.residual[0], rel=1e-12)
+        assert (one.penetration, one.handed_over) == (batch.penetration[0], batch.handed_over[0])
+    assert "obstacle forces" in one.summary()
+    with pytest.raises(sr.ParameterError, match="the search starts from rest"):
+        solver.equilibrium(MOTORS, FORCE, environment=environment, q_springs0=one.q_springs)
+    between = sr.Environment([sr.HalfSpace((0, 0, 1)), sr.HalfSpace((0, 0, -1))])
+    with pytest.raises(sr.EquilibriumNotFound, match="not in balance") as error:
+        solver.equilibrium(MOTORS, FORCE, environment=between)
+    assert error.value.best.handed_over
+
+
 def test_obstacles_of_each_case_and_their_order(arm: sr.SoftModel) -> None:
     """A door that closes, a case a place: as one by one; in another order the forces come in that order."""
     doors = [sr.Environment([WALL, sr.Box((0.1, 0.4, 0.4), (x, 0.0, 0.6), name="door")]) for x in (1.3, 1.05, 1.0)]
@@ -84,8 +106,8 @@ def test_obstacles_of_each_case_and_their_order(arm: sr.SoftModel) -> None:
 
 
 def test_hard_and_bad_cases_are_told(arm: sr.SoftModel) -> None:
-    """Inside of two walls at once there is no way out to first order: the plain solver says so; NaN is no number."""
-    between = sr.Environment([WALL, sr.HalfSpace((1, 0, 0), offset=1.2)])
+    """Between two walls without a gap there is no way out: the plain solver says so; NaN is no number."""
+    between = sr.Environment([sr.HalfSpace((0, 0, 1)), sr.HalfSpace((0, 0, -1))])
     batch: Any = sr.compile(arm, backend="python").equilibria(MOTORS, [FORCE, (np.nan, 0, 0)], environment=between)
     assert batch.handed_over.tolist() == [True, False]
     assert batch.status.tolist() == [Status.UNSETTLED, Status.NOT_A_NUMBER]

@@ -416,11 +416,20 @@ def test_a_linear_model_in_contact_rings_as_the_modes(name: str) -> None:
 # --- Refusals
 
 
+def test_a_robot_that_has_no_room_is_told_what_is_inside_of_what() -> None:
+    """Forces of two walls balance each other at any depth: that is no equilibrium, nor near a target."""
+    arm = sr.load_model(sr.InflatableArm())
+    slit = sr.Environment([sr.HalfSpace((0, 0, 1), name="floor"), sr.HalfSpace((0, 0, -1), name="ceiling")])
+    with pytest.raises(sr.EquilibriumNotFound, match=r"at any of 2 starts; 'link_[12]' is .* m inside of '(floor|ceiling)'"):
+        sr.solve_ik(arm, (0.9, 0.1, 0.3), environment=slit, starts=2)
+
+
 def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
     found = leaning("wall")
+    felt = sr.estimate_load(found.model, MOTORS, found.motor_torques, environment=found.environment, gravity=sr.EARTH_GRAVITY)
     refused: dict[str, Any] = {
         "simulation": lambda: sr.simulate(found.model, 0.1, MOTORS, start=found),
-        "by parameters": lambda: sr.sensitivity(found.model, found, "stiffness"),
+        "of an estimate": lambda: sr.sensitivity(found.model, felt, "stiffness"),
     }
     for words, call in refused.items():
         with pytest.raises(sr.ParameterError, match=f"{words}.*takes no obstacles"):

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from itertools import combinations
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -15,7 +16,8 @@ from scipy.spatial.transform import Rotation
 import softrobots as sr
 from softrobots.environment.capsules import robot_capsules
 from softrobots.environment.environment import Environment
-from softrobots.environment.obstacles import Box, HalfSpace, Sphere
+from softrobots.environment.obstacles import Box, Cylinder, HalfSpace, Sphere
+from softrobots.statics.elastic_state import ElasticProblem
 from studies.soak import contact_cases, contact_running
 from tests.support.law_robots import PUSHES, directions, model
 from tests.support.oracles import arm_energy
@@ -368,6 +370,38 @@ def test_what_contact_cannot_have_is_refused_by_name(arm: sr.SoftModel) -> None:
     block = Environment([Box((0.05, 0.05, 0.05), (0.03, 0.0, 0.07))])
     with pytest.raises(sr.EquilibriumNotFound, match=r"'link_1_root' is 0\.01 m inside of 'box_1', wherever the springs are"):
         sr.solve_equilibrium(arm, (0, 0, 0), environment=block)
+
+
+@pytest.mark.parametrize(
+    ("obstacle", "told"),
+    [
+        (Box((0.4, 0.4, 0.4), (0, 0, 0.1), name="block"), r"'link_1_root' starts, is 0\.1 m inside of 'block'.*on the surface"),
+        (Cylinder(0.2, 0.2, (0, 0, -0.09), name="foot"), r"is 0\.01 m inside of 'foot'"),
+        (Sphere(0.3, name="ball"), r"is 0\.3 m inside of 'ball'.*at most its radius of 0\.055 m"),
+        (HalfSpace((0, 0, 1), 0.06, name="floor"), r"is 0\.06 m inside of 'floor'"),
+    ],
+)
+def test_a_base_inside_of_an_obstacle_is_refused_before_anything_is_solved(
+    arm: sr.SoftModel, obstacle: sr.Obstacle, told: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where nothing moves it, nothing can free it: the searches of inverse kinematics took half a minute to fail."""
+    monkeypatch.setattr(ElasticProblem, "state", lambda *_: pytest.fail("solved"))
+    around: Any = {"environment": Environment([HalfSpace((-1, 0, 0), -5.0), obstacle])}
+    for solve in (
+        lambda: sr.solve_equilibrium(arm, MOTORS, FORCE, **around),
+        lambda: sr.solve_ik(arm, (0.9, 0.1, 0.7), FORCE, **around),
+        lambda: sr.follow_trajectory(arm, [(0.9, 0.1, 0.7), (0.9, 0.1, 0.69)], FORCE, **around),
+        lambda: sr.follow_contact(arm, [MOTORS, MOTORS], FORCE, friction=0.3, **around),
+        lambda: sr.compile(arm, backend="python").equilibria([MOTORS], FORCE, **around),
+    ):
+        with pytest.raises(sr.ParameterError, match=told):
+            solve()
+
+
+def test_a_half_space_may_hold_the_base_up_to_its_radius(arm: sr.SoftModel) -> None:
+    """The robot stands in it as on it."""
+    floor = Environment([HalfSpace((0, 0, 1), 0.05, name="floor")])
+    assert sr.solve_equilibrium(arm, (0, 0.9, -0.4), environment=floor).stable
 
 
 @pytest.mark.parametrize("force", [(3, 0, -8), (3, 0, -28), (3, 0.01, -28)])

@@ -31,7 +31,7 @@ WITHOUT = {
     "compiled.statuses.Status": "numbers with names",
     **dict.fromkeys((f"compiled.run.results.Compiled{name}" for name in ("Equilibrium", "LoadEstimate")), _RESULT),
     **dict.fromkeys((f"compiled.run.results.{name}Batch" for name in ("Equilibrium", "Load", "Motor")), _RESULT),
-    "compiled.run.contact_batches.ContactBatch": _RESULT,
+    **dict.fromkeys((f"compiled.run.contact_batches.Contact{name}" for name in ("Batch", "Equilibrium")), _RESULT),
     **dict.fromkeys(
         (f"{name}.{function}" for name in ("jax", "torch") for function in ("equilibrium", "load_estimate")),
         "functions of an optional package: test_jax and test_torch compare their derivatives with differences",

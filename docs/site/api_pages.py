@@ -132,7 +132,7 @@ PAGES = {
             "softrobots.compiled.statuses.Status",
             *(f"softrobots.compiled.run.results.{name}" for name in ("CompiledEquilibrium", "CompiledLoadEstimate")),
             *(f"softrobots.compiled.run.results.{name}" for name in ("EquilibriumBatch", "LoadBatch", "MotorBatch")),
-            "softrobots.compiled.run.contact_batches.ContactBatch",
+            *(f"softrobots.compiled.run.contact_batches.{name}" for name in ("ContactBatch", "ContactEquilibrium")),
             *_top("compiled.sweeps"),
         ),
     ),

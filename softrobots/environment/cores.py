@@ -9,9 +9,10 @@ from weakref import WeakKeyDictionary
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.vectors import skew
 from softrobots.environment.capsules import RobotCapsule, robot_capsules
+from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel, check_model
 
 SAME_POINT = 1e-9
@@ -48,6 +49,11 @@ class Cores:
         self._numbers = self._numbers.tolist()
         ends = np.array([[one.start, one.end] for one in self.capsules]).reshape(-1, 2, 3)
         self._local = np.concatenate([ends, np.ones((self.count, 2, 1))], axis=2)
+        nothing = read_only(np.zeros((0, self._model.nv)))
+        self.no_rows = nothing, read_only(np.zeros(0))
+        """No row over the joints, shape (0, nv), and its weights."""
+        self.no_load = JointLoad(read_only(np.zeros(self._model.nv)), nothing, nothing, None, None, 0.0, 0.0)
+        """No load on the joints."""
         self.moves = self._motion()
         """1 where a joint coordinate moves a capsule, else 0, shape (n, nv)."""
         self.single_ends, numbers, moving = self._single_ends(model)
@@ -60,14 +66,17 @@ class Cores:
         """Different ends at the base, with an end within their radius that no joint moves, and that end, both of shape (k,)."""
         self.base_radii = self.radii[self.end_capsules[self.bases]][:, None]
         """Radii of the latter, shape (k, 1) [m]."""
+        self.fixed = np.flatnonzero(~moving[self.single_ends])
+        """Different ends that no joint moves, shape (j,); none on a body beside the chain."""
+        self.fixed_points = self.at(pin.neutral(self._model)).ends.reshape(-1, 3)[self.single_ends][self.fixed]
+        """Where they are, shape (j, 3) [m]."""
 
     def at(self, q: FloatArray) -> CorePlaces:
         """Return the cores at Pinocchio's configuration, shape (nq,)."""
-        pin.computeJointJacobians(self._model, self._data, q)
+        jacobian = pin.computeJointJacobians(self._model, self._data, q).reshape(6, self._model.nv)  # a copy
         placements = self._data.oMi
         transforms = np.array([placements[number].homogeneous for number in self._numbers])
         ends = (self._local @ transforms.take(self.carrier, 0).swapaxes(1, 2))[:, :, :3]
-        jacobian = self._data.J.copy().reshape(6, self._model.nv)
         return CorePlaces(ends, ends[:, 1] - ends[:, 0], jacobian, transforms)
 
     def _motion(self) -> FloatArray:

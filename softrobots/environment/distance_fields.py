@@ -59,7 +59,7 @@ class HalfSpaces(NamedTuple):
 
     def at_least(self, points: FloatArray) -> FloatArray:
         """Distance of each point from each plane."""
-        return np.asarray(points @ self.normals.T - self.offsets)
+        return np.asarray(points.dot(self.normals.T) - self.offsets)
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance and normal."""
@@ -79,6 +79,20 @@ class HalfSpaces(NamedTuple):
         return np.zeros((len(starts), 0))
 
 
+def _turned_into(rotations: FloatArray, which: Any, vectors: FloatArray) -> FloatArray:
+    """Vectors, shape (m, 3), in the axes of their bodies; of a single body as one product."""
+    if len(rotations) == 1:
+        return np.asarray(vectors.dot(rotations[0]))
+    return np.asarray(np.vecmat(vectors, rotations.take(which, 0)))
+
+
+def _turned_out(rotations: FloatArray, which: Any, vectors: FloatArray) -> FloatArray:
+    """Vectors in the axes of their bodies, shape (m, 3), in world axes."""
+    if len(rotations) == 1:
+        return np.asarray(vectors.dot(rotations[0].T))
+    return np.asarray(np.matvec(rotations.take(which, 0), vectors))
+
+
 class _Around(NamedTuple):
     """Capsules around bodies."""
 
@@ -94,9 +108,9 @@ class _Around(NamedTuple):
     def at_least(self, points: FloatArray) -> FloatArray:
         """Distance of each point from each capsule."""
         ways = points[:, None] - self.centres
-        along = np.abs(np.einsum("mni,ni->mn", ways, self.axes))
+        along = np.abs(np.vecdot(ways, self.axes))
         beyond = np.maximum(along - self.halves, 0.0)
-        squares = np.maximum(np.einsum("mni,mni->mn", ways, ways) - along * along, 0.0)
+        squares = np.maximum(np.vecdot(ways, ways) - along * along, 0.0)
         return np.asarray(np.sqrt(squares + beyond * beyond) - self.radii)
 
 
@@ -114,10 +128,10 @@ class RoundedBoxes:
 
     def _beyond(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Points in the axes of the bodies, how far beyond the faces, the same or zero, and the distance from the box."""
-        local = ((points - self.centres.take(which, 0))[:, None] @ self.rotations.take(which, 0))[:, 0]
+        local = _turned_into(self.rotations, which, points - self.centres.take(which, 0))
         beyond = np.abs(local) - self.halves.take(which, 0)
         outside = np.maximum(beyond, 0.0)
-        return local, beyond, outside, np.sqrt(np.einsum("ij,ij->i", outside, outside))
+        return local, beyond, outside, np.sqrt(np.vecdot(outside, outside))
 
     def at_least(self, points: FloatArray) -> FloatArray:
         """Distance from a capsule around the body, exact for spheres and capsules."""
@@ -138,21 +152,23 @@ class RoundedBoxes:
             deepest = beyond[within].argmax(axis=1)
             normal[within, deepest] = 1.0
             distance[within] += beyond[within, deepest]
-        return distance, (self.rotations.take(which, 0) @ np.copysign(normal, local)[:, :, None])[:, :, 0]
+        return distance, _turned_out(self.rotations, which, np.copysign(normal, local))
 
     def _round(self, which: Any, beyond: FloatArray, distance: FloatArray) -> tuple[Any, FloatArray]:
         """Coordinates that are beyond faces, shape (m, 3), and one over the distance, zero at faces, shape (m,) [1/m]."""
         curved = (beyond > ON_BORDER * distance[:, None]) | self._thin.take(which, 0)
-        size = np.where((curved.sum(axis=1) > 1) & (distance > _TINY), 1.0 / np.maximum(distance, _TINY), 0.0)
+        size = ((np.add.reduce(curved, 1) > 1) & (distance > _TINY)) / np.maximum(distance, _TINY)
         return curved, size
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """One over the distance, in the coordinates that are beyond faces and across the normal; zero at faces."""
         local, beyond, outside, distance = self._beyond(points, which)
         curved, size = self._round(which, beyond, distance)
-        size, rotations = size[:, None], self.rotations.take(which, 0)
-        normal = outside * np.where(local < 0.0, -size, size)
-        directions = np.concatenate([rotations.swapaxes(1, 2), (rotations @ normal[:, :, None]).swapaxes(1, 2)], axis=1)
+        if not size.any():  # faces
+            return np.zeros((len(points), 0, 3)), np.zeros((len(points), 0))
+        size = size[:, None]
+        normal = _turned_out(self.rotations, which, np.copysign(outside * size, local))
+        directions = np.concatenate([self.rotations.take(which, 0).swapaxes(1, 2), normal[:, None]], axis=1)
         return directions, np.concatenate([curved * size, -size], axis=1)
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
@@ -160,17 +176,17 @@ class RoundedBoxes:
         found = self._beyond(points, which)
         distance, normal = self._at(which, *found)
         curved, size = self._round(which, found[1], found[3])
-        turned = (directions[:, None] @ self.rotations.take(which, 0))[:, 0]
-        slopes = np.einsum("ij,ij->i", normal, directions)
-        return distance, normal, size * (np.einsum("ij,ij->i", curved * turned, turned) - slopes * slopes)
+        turned = _turned_into(self.rotations, which, directions)
+        slopes = np.vecdot(normal, directions)
+        return distance, normal, size * (np.vecdot(curved * turned, turned) - slopes * slopes)
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where the coordinates pass the faces."""
         if not self._faces:
             return np.zeros((len(starts), 0))
-        rotations, halves = self.rotations.take(which, 0), self.halves.take(which, 0)
-        local = ((starts - self.centres.take(which, 0))[:, None, :] @ rotations)[:, 0]
-        along = (spans[:, None, :] @ rotations)[:, 0]
+        halves = self.halves.take(which, 0)
+        local = _turned_into(self.rotations, which, starts - self.centres.take(which, 0))
+        along = _turned_into(self.rotations, which, spans)
         along = np.where((halves > 0.0) & (np.abs(along) > _TINY), along, np.inf)
         return np.concatenate([(halves - local) / along, (-halves - local) / along], axis=1)
 
@@ -215,12 +231,12 @@ class Cylinders:
 
     def _beyond(self, points: FloatArray, which: Any) -> _BesideCylinder:
         """Points in the axes of the bodies."""
-        local = ((points - self.centres.take(which, 0))[:, None] @ self.rotations.take(which, 0))[:, 0]
+        local = _turned_into(self.rotations, which, points - self.centres.take(which, 0))
         from_axis, beyond = np.hypot(local[:, 0], local[:, 1]), np.zeros((len(points), 2))
         beyond[:, 0] = from_axis - self.radii.take(which)
         beyond[:, 1] = np.abs(local[:, 2]) - self.halves.take(which)
         slopes = np.maximum(beyond, 0.0)
-        outside = np.sqrt(np.einsum("ij,ij->i", slopes, slopes))
+        outside = np.sqrt(np.vecdot(slopes, slopes))
         slopes /= np.maximum(outside, _TINY)[:, None]
         within = (outside < _TINY).nonzero()[0]
         slopes[within, beyond[within].argmax(axis=1)] = 1.0
@@ -237,7 +253,7 @@ class Cylinders:
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance and normal."""
         found = self._beyond(points, which)
-        return found.distance, (self.rotations.take(which, 0) @ found.normal[:, :, None])[:, :, 0]
+        return found.distance, _turned_out(self.rotations, which, found.normal)
 
     def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Around the axis at side and rim, and across the rim."""
@@ -250,20 +266,20 @@ class Cylinders:
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and the second derivative."""
-        found, rotations = self._beyond(points, which), self.rotations.take(which, 0)
+        found = self._beyond(points, which)
         outward, (across, size) = found.outward, found.curvatures
-        turned = (directions[:, None] @ rotations)[:, 0]
-        radial, axial = np.einsum("ij,ij->i", outward, turned), turned[:, 2]
+        turned = _turned_into(self.rotations, which, directions)
+        radial, axial = np.vecdot(outward, turned), turned[:, 2]
         around = outward[:, 0] * turned[:, 1] - outward[:, 1] * turned[:, 0]
-        slopes = np.einsum("ij,ij->i", found.normal, turned)
+        slopes = np.vecdot(found.normal, turned)
         bend = across * around * around + size * (radial * radial + axial * axial - slopes * slopes)
-        return found.distance, (rotations @ found.normal[:, :, None])[:, :, 0], bend
+        return found.distance, _turned_out(self.rotations, which, found.normal), bend
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where it passes the planes of the ends, and the side."""
-        rotations, half, radius = self.rotations.take(which, 0), self.halves.take(which), self.radii.take(which)
-        local = ((starts - self.centres.take(which, 0))[:, None, :] @ rotations)[:, 0]
-        along = (spans[:, None, :] @ rotations)[:, 0]
+        half, radius = self.halves.take(which), self.radii.take(which)
+        local = _turned_into(self.rotations, which, starts - self.centres.take(which, 0))
+        along = _turned_into(self.rotations, which, spans)
         rise = np.where(np.abs(along[:, 2]) > _TINY, along[:, 2], np.inf)
         square = along[:, 0] ** 2 + along[:, 1] ** 2
         turn = local[:, 0] * along[:, 0] + local[:, 1] * along[:, 1]

@@ -27,7 +27,8 @@ class Environment:
     """The obstacles that a robot may touch, and whether it may touch itself.
 
     What a robot stands on it does not touch at its base: of an obstacle that holds an end of a capsule's core which no joint
-    moves, ends within a radius of that one are no contacts.
+    moves, ends within a radius of that one are no contacts. Such an end deeper inside than its radius is refused, and one
+    inside of a box or cylinder, which the robot cannot leave without a contact.
 
     Immutable; equal, with the same hash, if the obstacles are equal, in the same order. It pickles if the poses do.
     """

@@ -119,7 +119,7 @@ class Gaps:
         normal, nv = forces.ndim == 1, self.places.jacobian.shape[1]
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
-            return JointLoad(np.zeros(nv), np.zeros((0, nv)), np.zeros((0, nv)), None, None, 0.0, 0.0)
+            return self._cores.no_load
         normals, moves = self.normals.take(rows, 0), self._cores.moves.take(self.capsules.take(rows), 0)
         points, vectors = self.core_points.take(rows, 0), forces.take(rows, 0)
         if normal:
@@ -135,7 +135,7 @@ class Gaps:
         jacobian, moves = self.places.jacobian, moves[:, None, :]
         linear, angular = (jacobian[:3] - skew(points) @ jacobian[3:]) * moves, jacobian[3:] * moves
         return JointLoad(
-            torque=vectors.ravel().dot(linear.reshape(-1, nv)),
+            torque=forces.dot(self.jacobian) if normal else vectors.ravel().dot(linear.reshape(-1, nv)),
             angular=angular.reshape(-1, nv),
             by_force=(skew(-vectors) @ linear).reshape(-1, nv),
             by_moment=None,
@@ -154,8 +154,7 @@ class Gaps:
             Rows, shape (k, nv), and weights, shape (k,) [N/m]: :math:`\sum f_i\, d^2 g_i` is the derivative of the torque of
             `load(forces)` plus `rows.T @ diag(weights) @ rows`.
         """
-        nv, first = self.places.jacobian.shape[1], 0
-        found, weights = list[FloatArray](), list[FloatArray]()
+        first, found, weights = 0, list[FloatArray](), list[FloatArray]()
         for field, which in self.parts:
             if not isinstance(field, HalfSpaces):
                 rows = first + forces[first : first + len(which)].nonzero()[0]
@@ -165,7 +164,7 @@ class Gaps:
                     self._curved(field, which.take(rows - first), rows, forces.take(rows), found, weights)
             first += len(which)
         if not found:
-            return np.zeros((0, nv)), np.zeros(0)
+            return self._cores.no_rows
         return (found[0], weights[0]) if len(found) == 1 else (np.concatenate(found), np.concatenate(weights))
 
     def _curved(self, field: Field, which: Any, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
@@ -183,13 +182,12 @@ class Gaps:
             return
         rows, directions = rows.take(inside), directions.take(inside, 0)
         spans = self.places.spans.take(self.capsules.take(rows), 0)
-        parts = curvatures.take(inside, 0) * (directions @ spans[:, :, None])[:, :, 0]
-        pulls = (parts[:, None] @ directions)[:, 0]  # H t
-        bend = np.einsum("ij,ij->i", pulls, spans)
+        pulls = np.vecmat(curvatures.take(inside, 0) * np.matvec(directions, spans), directions)  # H t
+        bend = np.vecdot(pulls, spans)
         slides = (bend > 0.0).nonzero()[0]
         if len(slides):
             turned = cross(spans, self.normals.take(rows, 0)).dot(self.places.jacobian[3:]) * self.moves.take(rows, 0)
-            found.append(((pulls[:, None] @ velocity.take(inside, 0))[:, 0] + turned).take(slides, 0))
+            found.append((np.vecmat(pulls, velocity.take(inside, 0)) + turned).take(slides, 0))
             weights.append((-forces.take(inside) / np.where(bend > 0.0, bend, 1.0)).take(slides))
 
     def _curved_by_itself(self, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:

@@ -71,9 +71,9 @@ def core_points(
     if at_ends is None:
         both = field.at(np.stack([starts, starts + spans], axis=1).reshape(-1, 3), which.repeat(2))
         at_ends = both[0].reshape(-1, 2), both[1].reshape(-1, 2, 3)
-    length = np.sqrt(np.einsum("ij,ij->i", spans, spans))
+    length = np.sqrt(np.vecdot(spans, spans))
     along = spans / length[:, None]
-    distances, slopes, shares = at_ends[0], (at_ends[1] @ along[:, :, None])[:, :, 0], _ENDS
+    distances, slopes, shares = at_ends[0], np.matvec(at_ends[1], along), _ENDS
     borders = field.borders(starts, spans, which)
     crossed = (borders > 0.0) & (borders < 1.0)
     used = np.asarray(crossed.any(axis=0)).nonzero()[0]
@@ -86,7 +86,7 @@ def core_points(
         inner, normals = flat[0].reshape(borders.shape), flat[1].reshape(points.shape)
         ways = borders * length[:, None]
         keep = (ways > merged) & (ways < length[:, None] - merged) & (inner <= limits[:, None])
-        distances, slopes = _between(distances, inner), _between(slopes, (normals @ along[:, :, None])[:, :, 0])
+        distances, slopes = _between(distances, inner), _between(slopes, np.matvec(normals, along))
         shares = _between(np.broadcast_to(_ENDS, (len(which), 2)), borders)
 
     found = NO_POINTS
@@ -157,7 +157,7 @@ def _minimum(
     for _ in range(_MAX_ITERATIONS):
         points = starts + share[:, None] * spans
         distance, normal, bend = field.along(points, which, along)
-        slope = np.einsum("ij,ij->i", normal, along)
+        slope = np.vecdot(normal, along)
         waiting = np.abs(slope) > _SLOPE
         if not waiting.any():
             break

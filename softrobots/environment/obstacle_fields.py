@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -9,29 +10,29 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.environment.convex_mesh import Mesh, hull_of
 from softrobots.environment.distance_fields import Cylinders, Field, HalfSpaces, RoundedBoxes
-from softrobots.environment.environment import Environment
-from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
+from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Obstacle, Sphere
 
 
-def obstacle_fields(environment: Environment) -> list[tuple[Field, Any]]:
-    """Return fields of distances, each with the numbers of its obstacles in the environment.
+def obstacle_fields(obstacles: Iterable[Obstacle]) -> list[tuple[Field, Any]]:
+    """Return fields of distances, each with the numbers of its obstacles among those given: an environment, or several.
 
     Raises:
         ParameterError: If an obstacle moves: `Environment.at` fixes it.
     """
-    transforms = obstacle_transforms(environment)
+    given = tuple(obstacles)
+    transforms = obstacle_transforms(given)
     fields: list[tuple[Field, Any]] = []
     boxes = (Box, Sphere, Capsule), _rounded_boxes
     for kinds, make in ((HalfSpace, _half_spaces), boxes, (Cylinder, _cylinders), (Mesh, _polyhedra)):
-        numbers = np.array([i for i, one in enumerate(environment.obstacles) if isinstance(one, kinds)], dtype=np.intp)
+        numbers = np.array([i for i, one in enumerate(given) if isinstance(one, kinds)], dtype=np.intp)
         if len(numbers):
-            fields.append((make([environment.obstacles[i] for i in numbers.tolist()], transforms[numbers]), numbers))
+            fields.append((make([given[i] for i in numbers.tolist()], transforms[numbers]), numbers))
     return fields
 
 
-def obstacle_transforms(environment: Environment) -> FloatArray:
+def obstacle_transforms(obstacles: Iterable[Obstacle]) -> FloatArray:
     """Return the transforms of the obstacles to the world, shape (n, 4, 4)."""
-    return np.array([one.transform_to_world for one in environment.obstacles], dtype=np.float64).reshape(-1, 4, 4)
+    return np.array([one.transform_to_world for one in obstacles], dtype=np.float64).reshape(-1, 4, 4)
 
 
 def _half_spaces(obstacles: list[Any], transforms: FloatArray) -> HalfSpaces:

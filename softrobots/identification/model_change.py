@@ -85,6 +85,20 @@ def model_change(parameters: ParameterSet, values: Any = None, *, fourth_order: 
     return ModelChange(len(at), columns)
 
 
+@lru_cache(maxsize=32)
+def present_change(parameters: ParameterSet) -> ModelChange:
+    """Return `model_change` about the values that a robot has, found once.
+
+    Raises:
+        ParameterError: If a name is that of several parts whose values differ; or as `model_change` does.
+    """
+    present, loaded = numbers_of(parameters.present), numbers_of(parameters.model(parameters.values))
+    if any(not np.allclose(present[name], loaded[name], rtol=1e-9, atol=1e-12) for name in present):
+        requirement = "names of numbers with the values that the robot has: one name of several parts ties them to one value"
+        raise ParameterError("parameters", parameters.names, requirement)
+    return model_change(parameters)
+
+
 def differences(
     parameter: Parameter, value: float, base: Numbers, at: Callable[[float], Numbers], *, fourth_order: bool = False
 ) -> Numbers:

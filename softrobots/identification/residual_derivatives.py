@@ -26,9 +26,11 @@ import numpy as np
 from softrobots.constant_curvature.strain_chain import SectionChain
 from softrobots.core.checks import FloatArray
 from softrobots.identification.derivatives.actuator_derivatives import ActuatorStates
+from softrobots.identification.derivatives.contact_derivatives import ContactDerivatives
 from softrobots.identification.derivatives.loaded_tree import LoadedTree
 from softrobots.identification.derivatives.spring_derivatives import SpringStates
 from softrobots.identification.model_change import ModelChange, numbers_of
+from softrobots.identification.parameters import ParameterSet
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.equilibrium import Equilibrium
@@ -75,13 +77,17 @@ class Outputs(NamedTuple):
     """Weights of the loads on the actuators, shape (N, L, n_motors)."""
     strains: FloatArray | None = None
     """Weights of the strains, shape (N, L, n_strains): of the elastic coordinates, unless lengths of actuators are given."""
+    forces: FloatArray | None = None
+    """Weights of the normal forces of an equilibrium in contact, shape (1, L, k)."""
 
 
 class EquilibriumDerivatives:
     """N equilibria of a robot without dry friction, and what the derivatives of all outputs need of them."""
 
-    def __init__(self, model: SoftModel, states: States) -> None:
-        """Evaluate the robot at the states."""
+    def __init__(self, model: SoftModel, states: States, contact: ContactDerivatives | None = None) -> None:
+        """Evaluate the robot at the states; of a single one in contact, with its contacts."""
+        self.contact = contact
+        """The contacts of the only state; None in free space."""
         structure, held = model.structure, model.structure.muscle_lengths
         self.model, self.states, self.numbers, self._sections = model, states, numbers_of(model), _section_joints(model)
         self.n_joint_motors, self._n_singles = len(structure.motor_joints), len(structure.spring_joints)
@@ -176,7 +182,7 @@ class AdjointRows:
             NeutralEquilibrium: If the tangent stiffness of a state is singular.
         """
         self._at, self._outputs, count = at, outputs, at.n_joint_motors
-        given = next(one for one in (outputs.pose, outputs.loads, outputs.strains) if one is not None)
+        given = next(one for one in (outputs.pose, outputs.loads, outputs.strains, outputs.forces) if one is not None)
         shape = given.shape[:2]
         self._weights = np.zeros((*shape, at.model.n_motors)) if outputs.loads is None else outputs.loads
         if outputs.pose is None:
@@ -197,12 +203,23 @@ class AdjointRows:
             by_actuators[..., count:], elastic = elastic @ at.slopes[0], elastic @ at.slopes[1]
         elif at.actuators is not None:
             by_actuators[..., count:] = self._weights[..., count:] * at.actuators.by_input[:, None]
-        virtual = elastic @ at.compliance
+        if at.contact is None:
+            virtual = elastic @ at.compliance
+        else:
+            virtual, self._gaps = at.contact.rows_of(elastic, self._weights, outputs.forces)
         self.by_actuators = by_actuators + virtual @ at.states.coupling
         """Derivatives of the outputs by the actuators, shape (N, L, n_motors)."""
+        if at.contact is not None:
+            self.by_actuators += self._weights @ at.contact.loads_by_motors - self._gaps @ at.contact.by_motors
         if at.slopes is not None:
             self._lengths = -self.by_actuators[..., count:]
         self._move(strains + (virtual if at.slopes is None else virtual @ np.swapaxes(at.slopes[1], -1, -2)))
+
+    def by_contacts(self, parameters: ParameterSet) -> FloatArray:
+        """What the parameters of the model add through gaps and contact load at constant coordinates, shape (N, L, P)."""
+        if self._at.contact is None:
+            return np.zeros((*self.virtual.shape[:2], len(parameters.names)))
+        return self._at.contact.along(parameters, self.virtual, self._weights, self._gaps)
 
     def _move(self, strains: FloatArray, *, works: bool = True) -> None:
         """Take virtual rates of strains, (N, L, n_strains), in which loads work; without `works` they are zero."""

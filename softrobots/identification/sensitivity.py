@@ -13,9 +13,10 @@ from softrobots.core.checks import FloatArray, finite_array, instance_of, read_o
 from softrobots.core.errors import ParameterError
 from softrobots.core.summary import Part, Summarised, Table, short
 from softrobots.dynamics.vibration import VibrationModes
+from softrobots.identification.derivatives.contact_derivatives import ContactDerivatives
 from softrobots.identification.derivatives.frequency_derivatives import frequency_slopes
 from softrobots.identification.friction_derivatives import friction_loads
-from softrobots.identification.model_change import ModelChange, model_change, numbers_of
+from softrobots.identification.model_change import present_change
 from softrobots.identification.parameter_names import LOADS
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
@@ -141,6 +142,12 @@ class Sensitivity(Summarised):
         inverse = np.where(values > OBSERVABLE * model.reach, 1.0 / np.maximum(values, 1e-300), 0.0)
         return read_only(-(right.T * inverse) @ left.T @ (slopes * felt))
 
+    @cached_property
+    def normal_forces(self) -> FloatArray:
+        """Derivative of the normal force of each contact of the equilibrium, in their order, shape (k, P) [N per unit]."""
+        count = len(self.equilibrium.contacts)
+        return self._of(Outputs(forces=np.eye(count)[None])) if count else np.zeros((0, len(self.names)))
+
     def frequencies(self, modes: VibrationModes) -> FloatArray:
         """Derivatives of natural frequencies, shape (n_modes, P) [Hz per unit].
 
@@ -150,8 +157,9 @@ class Sensitivity(Summarised):
             modes: The modes of the equilibrium, `vibration_modes(model, equilibrium)`.
 
         Raises:
-            ParameterError: If the modes are those of another equilibrium.
+            ParameterError: If the modes are those of another equilibrium, or of one in contact.
         """
+        check_no_contact(self.equilibrium, "a derivative of frequencies")
         instance_of("modes", modes, VibrationModes, "VibrationModes of the equilibrium")
         mine, other = self.equilibrium, modes.equilibrium
         if not (
@@ -162,8 +170,8 @@ class Sensitivity(Summarised):
 
     def check(self) -> None:
         """Prepare what all derivatives need; see `sensitivity` for what it raises."""
-        _change(self.parameters)
-        _ = self._at.compliance
+        present_change(self.parameters)
+        _ = self._at.compliance if self._at.contact is None else None
 
     def _of(self, outputs: Outputs) -> FloatArray:
         """Derivatives of rows of outputs, shape (L, P); in an estimate with the change of the force."""
@@ -185,7 +193,7 @@ class Sensitivity(Summarised):
         What friction remembers stays, but for a robot that nothing has moved: that remembers its shape at rest.
         """
         friction, memory = self.equilibrium.model.structure.friction, memory_of(self.equilibrium.model)
-        change = _change(self.parameters)
+        change = present_change(self.parameters)
         if friction is not None and not np.array_equal(memory.bending, friction.untouched.bending):
             change = change._replace(by_number={name: one for name, one in change.by_number.items() if name != "rest"})
         loads = friction_loads(self._at, memory.bending[None], change, lambda rows: self._without_friction(rows)[0][None])
@@ -194,14 +202,16 @@ class Sensitivity(Summarised):
     def _without_friction(self, rows: AdjointRows) -> tuple[FloatArray, FloatArray]:
         """The same while the load of friction stays."""
         parameters, tip = self.parameters, self._tip
-        slopes = rows.by_numbers(_change(parameters))[0]
+        slopes = rows.by_numbers(present_change(parameters))[0]
+        if self._at.contact is not None:
+            slopes += rows.by_contacts(parameters)[0]
         by_load = {name: one[0] for name, one in rows.by_loads().items()} if self._loaded else {}
         by_kind = {"motor": rows.by_actuators[0], "offset": rows.by_actuators[0], "base": None, "gravity": by_load.get("")}
         by_kind |= dict.fromkeys(("force", "wrench"), by_load.get(tip))
         for place, one in parameters.direct:
             kind, parts = one.place.kind, list(one.place.parts)
             if kind == "base":
-                slopes[:, place] = rows.by_base()[0][:, parts[0] + (3 if one.place.names[0] == "rotation" else 0)]
+                slopes[:, place] += rows.by_base()[0][:, parts[0] + (3 if one.place.names[0] == "rotation" else 0)]
             elif by_kind.get(kind) is not None:
                 slopes[:, place] = by_kind[kind][:, parts].sum(axis=1)
         return slopes, by_load[tip][:, :3] if tip in by_load else np.zeros((len(slopes), 3))
@@ -225,7 +235,8 @@ class Sensitivity(Summarised):
             loads.setdefault(self._tip, np.zeros((1, 6)))
         if "gravity" in self._loaded:
             loads.setdefault("", np.zeros((1, 3)))
-        return EquilibriumDerivatives(self.equilibrium.model, states._replace(loads=loads))
+        contact = ContactDerivatives(self.equilibrium) if self.equilibrium.contacts else None
+        return EquilibriumDerivatives(self.equilibrium.model, states._replace(loads=loads), contact)
 
     def _frame_axes(self, frame: str) -> FloatArray:
         return np.array(frame_placement(self.equilibrium.model, self.equilibrium.q, frame).rotation)
@@ -242,7 +253,7 @@ def sensitivity(
     of a tendon arm, whatever the number of parameters; a further one of the same equilibrium as long as 0.7 and 0.35.
 
     At a knee (the end of a plateau, a tendon that goes slack) they are the derivatives of the side that the state is on.
-    Friction of sections that bend slips or sticks as it does, and what it remembers stays.
+    Friction of sections that bend slips or sticks as it does, and what it remembers stays. Pressed contacts stay pressed.
 
     Args:
         model: The robot.
@@ -254,16 +265,22 @@ def sensitivity(
         The derivatives. They are cheap to compute and are not saved.
 
     Raises:
-        ParameterError: If the equilibrium belongs to another model or has obstacles, its robot has friction of guides,
-            or friction of segments whose muscle lengths are given, a name is that of several parts whose values differ,
-            or the structure of the robot changes with a parameter.
+        ParameterError: If the equilibrium belongs to another model, its robot has friction of guides, or friction of segments
+            whose muscle lengths are given, a name is that of several parts whose values differ, or the structure of the robot
+            changes with a parameter. In contact also if a contact has friction, touches without a force, or holds what another
+            one holds, the robot has dry friction or given muscle lengths, or it is an estimate.
         NameNotFound: If there is no such parameter; with all that there are.
         NeutralEquilibrium: If the tangent stiffness is singular: a neutral equilibrium has no derivative.
     """
     estimate, at = (equilibrium, equilibrium.equilibrium) if isinstance(equilibrium, LoadEstimate) else (None, equilibrium)
     check_same_model(model, at)
-    check_no_contact(at, "a derivative by parameters")
+    if estimate is not None:
+        check_no_contact(at, "a derivative of an estimate")
     friction = model.structure.friction
+    if at.contacts and (friction is not None or model.structure.muscle_lengths is not None):
+        raise ParameterError(
+            "equilibrium", list(at.contacts), "one without, for a robot with dry friction or given muscle lengths"
+        )
     if friction is not None and (friction.guided or model.structure.muscle_lengths is not None):
         requirement = "a robot without friction of guides, and without friction of segments whose muscle lengths are given"
         raise ParameterError("model", model.pinocchio.name, f"{requirement}, for derivatives by parameters")
@@ -281,17 +298,3 @@ def sensitivity(
 def _named(model: SoftModel, with_robot: bool, names: tuple[str, ...]) -> ParameterSet:
     """Parameters by name, looked up once."""
     return ParameterSet.of(model, names)
-
-
-@lru_cache(maxsize=32)
-def _change(parameters: ParameterSet) -> ModelChange:
-    """How the model changes with its parameters, found once.
-
-    Raises:
-        ParameterError: See `sensitivity`.
-    """
-    present, loaded = numbers_of(parameters.present), numbers_of(parameters.model(parameters.values))
-    if any(not np.allclose(present[name], loaded[name], rtol=1e-9, atol=1e-12) for name in present):
-        requirement = "names of numbers with the values that the robot has: one name of several parts ties them to one value"
-        raise ParameterError("parameters", parameters.names, requirement)
-    return model_change(parameters)

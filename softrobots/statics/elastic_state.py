@@ -150,9 +150,9 @@ def _with_curvature(point: Point, reduced: ReducedLoad, touch: Touch) -> Reduced
     if not len(weights):
         return reduced
     by_motors, by_springs = point.columns(rows)
-    bent = (by_springs.T * weights) @ by_springs
+    weighted = by_springs.T * weights
     return reduced._replace(
-        derivative=reduced.derivative + bent, coupling=reduced.coupling + (by_springs.T * weights) @ by_motors
+        derivative=reduced.derivative + weighted.dot(by_springs), coupling=reduced.coupling + weighted.dot(by_motors)
     )
 
 

@@ -23,6 +23,7 @@ from softrobots.model.friction_coordinates import SAME_FRICTION, gripped
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.solver import settle
+from softrobots.statics.contact.touch import TOUCHING
 from softrobots.statics.elastic_state import (
     TOLERANCE,
     ElasticProblem,
@@ -104,8 +105,12 @@ def balanced_state(
     method: str = "newton",
     tolerance: float = TOLERANCE,
 ) -> ElasticState | None:
-    """Solve for the elastic coordinates; None where the residual stays above `TOLERANCE`."""
+    """Solve for the elastic coordinates; None where the residual stays above `TOLERANCE`, or a gap is not what it must be."""
     state, _, _ = solve_springs(model, q_motors, load, start, method=method, tolerance=tolerance)
+    if state.touch is not None:
+        values, pressed = state.touch.gaps.values, state.touch.forces > 0.0
+        if np.where(pressed, np.abs(values), -values).max(initial=0.0) > TOUCHING * model.reach:
+            return None
     return state if state.error <= largest_residual(model, state.scale, max(tolerance, TOLERANCE)) else None
 
 

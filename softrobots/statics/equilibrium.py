@@ -89,7 +89,7 @@ def solve_equilibrium(
     if not result.converged:
         raise EquilibriumNotFound(
             f"no equilibrium by {method!r} in {iterations} iterations: residual {result.residual:.3g} N m, required "
-            f"{result.tolerance:.3g} N m" + _hint(result, state),
+            f"{result.tolerance:.3g} N m" + advice(result, state),
             best=result,
             residual=result.residual,
             iterations=iterations,
@@ -97,8 +97,8 @@ def solve_equilibrium(
     return result
 
 
-def _hint(best: Equilibrium, state: ElasticState) -> str:
-    """Advice for the error message."""
+def advice(best: Equilibrium, state: ElasticState) -> str:
+    """Return what the error of a state that is no equilibrium says of the cause and of a cure, after a semicolon."""
     if state.touch is not None and state.touch.penetration > TOUCHING * best.model.reach:
         return f"; {deepest_penetration(state.touch, state.point)}"
     ends = best.model.structure.at_range_end(best.q_motors, best.q_springs)

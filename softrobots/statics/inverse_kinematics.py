@@ -19,7 +19,7 @@ from softrobots.model.actuators import joined_units
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import ElasticState
 from softrobots.statics.elastostatics import METHODS, solve_springs
-from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.equilibrium import Equilibrium, advice, equilibrium_from_state
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.spherical_wrist import spherical_wrist
@@ -258,9 +258,8 @@ def _same_pose(model: SoftModel, one: LocalSolution[ElasticState], other: LocalS
 def _raise_unsolved(model: SoftModel, motors: FloatArray, load: Load, method: str, starts: int) -> NoReturn:
     state, spent, _ = solve_springs(model, motors, load, model.rest, method=method)
     best = equilibrium_from_state(model, motors, load, state, method=method, iterations=spent)
-    hint = "; method='newton' converges for larger loads" if method == "fixed_point" else ""
     raise EquilibriumNotFound(
-        f"no equilibrium under this load by {method!r} at any of {starts} starts{hint}",
+        f"no equilibrium under this load by {method!r} at any of {starts} starts{advice(best, state)}",
         best=best,
         residual=best.residual,
         iterations=spent,

@@ -214,7 +214,8 @@ class AppliedLoad:
             self._scale += term.norms[0] * model.reach + term.norms[1]
         no_rows = np.zeros((0, self._nv))
         nothing = JointLoad(np.zeros(self._nv), no_rows, no_rows, None, None, 0.0, 0.0)
-        self.nothing = None if self._terms or load.gravity is not None else nothing
+        self._heavy = load.gravity is not None and any(load.gravity)
+        self.nothing = None if self._terms or self._heavy else nothing
         """The load where there is no wrench and no gravity; it is the same everywhere."""
 
     def at(self, q: FloatArray) -> JointLoad:
@@ -236,7 +237,7 @@ class AppliedLoad:
                 by_moment.append(products[4:])
             potential -= float(term.force.dot(pin.updateFramePlacement(model, data, frame).translation))
         gravity_derivative: FloatArray | None = None
-        if self._load.gravity is not None:
+        if self._heavy:
             gravity_derivative = -pin.computeGeneralizedGravityDerivatives(model, data, q)
             torques.append(-data.g)
             scale += math.hypot(*data.g.tolist())

@@ -20,7 +20,7 @@ from softrobots.export.mjcf_contact import steadying_armature
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.statics.equilibrium_result import Equilibrium
-from studies.benchmark.arm_baselines import GENERAL, MUJOCO, MUJOCO_ANY, batch_name
+from studies.benchmark.arm_baselines import GENERAL, MUJOCO, MUJOCO_ANY, batch_name, single_name
 from studies.benchmark.cases import ROD_LENGTH, LoadCases, arm, random_forces, rod
 from studies.benchmark.comparison import Comparison, Outcome, Settings, figure
 from studies.benchmark.compiled_solvers import compiled
@@ -43,7 +43,7 @@ _TIP_FORCE = 0.05  # on the tip of the rod [N]
 _ACROSS = ((1.0, 0.0, 0.0), (0.0, 0.0, -1.0), (0.0, 1.0, 0.0))  # turns z to y
 _PEG, _PEG_LENGTH = 0.01, 0.3  # radius and length of a peg [m]
 _TUNED = 8  # cases that the simulator is tuned on, at most a fifth of all
-_BATCH = batch_name("numba")
+_BATCH, _SINGLE = batch_name("numba"), single_name("numba")
 _CHECKED = 10  # cases whose forces are compared before anything is timed
 
 
@@ -152,13 +152,16 @@ def contact(settings: Settings) -> Outcome:
         comparison = Comparison(settings, scene.name)
         comparison.add(GENERAL, partial(_ours, scene))
         comparison.add(_BATCH, partial(_batch, scene))
+        comparison.add(_SINGLE, partial(_single, scene))
         for name in (AS_EXPORTED, LOOSELY, MUJOCO, MUJOCO_ANY):
             comparison.add(name, partial(_settling, name, settings, scene, notes))
         comparison.run()
-        values = comparison.seconds[GENERAL] if GENERAL in comparison.seconds else comparison.absent[GENERAL]
-        rows.append(dataclasses.replace(figure(scene.name, GENERAL, "s", values, AT_MOST, scene.target), clock="CPU"))
+        for name in (GENERAL, _SINGLE):
+            values = comparison.seconds[name] if name in comparison.seconds else comparison.absent[name]
+            rows.append(dataclasses.replace(figure(scene.name, name, "s", values, AT_MOST, scene.target), clock="CPU"))
         rows.append(comparison.cheaper(scene.name, GENERAL, AS_EXPORTED, AT_LEAST, 20.0))
         rows += [comparison.cheaper(scene.name, GENERAL, name) for name in (LOOSELY, MUJOCO, MUJOCO_ANY)]
+        rows.append(comparison.cheaper(scene.name, _SINGLE, AS_EXPORTED, AT_LEAST, 20.0))
         rows += [comparison.cheaper(scene.name, _BATCH, name, AT_LEAST, 20.0) for name in (AS_EXPORTED, LOOSELY)]
     return Outcome(rows, notes=notes)
 
@@ -183,6 +186,14 @@ def _batch(scene: Scene) -> Workload:
     )
     require_agreement(_BATCH, found, expected, 1e-9 * float(np.abs(expected).max()), "N")
     return Workload(len(scene.cases.forces), solve)
+
+
+def _single(scene: Scene) -> Workload:
+    """The same one by one, each checked and certified."""
+    solve = compiled(scene.theirs, "numba").equilibrium
+    options: Any = {"gravity": scene.gravity if any(scene.gravity) else None, "environment": scene.environment}
+    pairs = list(zip(*scene.cases, strict=True))
+    return Workload(len(pairs), lambda: [solve(*pair, **options) for pair in pairs])
 
 
 def _settling(name: str, settings: Settings, scene: Scene, notes: list[str]) -> Workload:

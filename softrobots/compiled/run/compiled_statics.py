@@ -13,12 +13,14 @@ from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
+from softrobots.compiled.run.certified import certified
 from softrobots.compiled.run.contact_batches import ContactSolver
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
-from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.dynamics.step_control import order_of_steps
+from softrobots.environment.environment import Environment
 from softrobots.model.soft_model import SoftModel
 
 NO_FORCE = read_only(np.zeros(3))
@@ -149,7 +151,13 @@ class CompiledStatics:
         return script(self._model, self._unknowns, self._run(gravity).program, gravity=gravity, points=points)
 
     def equilibrium(
-        self, q_motors: Any, force: Any = NO_FORCE, *, gravity: Any = None, q_springs0: Any = None
+        self,
+        q_motors: Any,
+        force: Any = NO_FORCE,
+        *,
+        gravity: Any = None,
+        q_springs0: Any = None,
+        environment: Environment | None = None,
     ) -> CompiledEquilibrium:
         """Find the equilibrium under a force on the tip.
 
@@ -158,14 +166,22 @@ class CompiledStatics:
             force: Force on the tip, shape (3,) [N], world axes.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             q_springs0: Start of the search, shape (n_springs,) [rad or m]; at rest by default.
+            environment: Obstacles that the robot touches without friction, as in `equilibria`, from rest.
 
         Returns:
-            The equilibrium, `stable`, or neutral as `solve_equilibrium` finds it, too: `status` tells which.
+            The equilibrium, `stable`, or neutral as `solve_equilibrium` finds it, too: `status` tells which. In contact a
+            `ContactEquilibrium`.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, or no shape of the robot has these muscle lengths.
+            ParameterError: If a shape differs, a number is not finite, or no shape of the robot has these muscle lengths; in
+                contact also if a start is given, and as `equilibria`.
             EquilibriumNotFound: If no stable or neutral equilibrium is found; the error carries the best point.
         """
+        if environment is not None:
+            if q_springs0 is not None:
+                raise ParameterError("q_springs0", q_springs0, "None in contact: the search starts from rest")
+            given = q_motors, force, gravity, environment
+            return certified(self._solver_in_contact().equilibrium(self._actuation, self._run(False), *given))
         if (
             self._plain
             and q_springs0 is None
@@ -219,16 +235,11 @@ class CompiledStatics:
             springs = finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
             run.put(w, run.layout.unknown, self._actuation.unknowns(motors, springs))
             status = Status(run.settle_from(w))
-        equilibrium = CompiledEquilibrium(w, run.layout, self._actuation, motors, status)
-        if status not in (Status.CERTIFIED, Status.NEUTRAL):
-            raise EquilibriumNotFound(
-                f"no certified equilibrium at motors {motors.tolist()} under {equilibrium.force.tolist()} N: "
-                f"{status.explanation}; {equilibrium.residual:.3g} N m are out of balance",
-                best=equilibrium,
-                residual=equilibrium.residual,
-                iterations=int(w[run.layout.single("iterations")]),
-            )
-        return equilibrium
+        return certified(CompiledEquilibrium(w, run.layout, self._actuation, motors, status))
+
+    def _solver_in_contact(self) -> ContactSolver:
+        self._touching = self._touching or ContactSolver(self._model, self._unknowns, self._backend)
+        return self._touching
 
     def equilibria(
         self, q_motors: Any, forces: Any, *, gravity: Any = None, threads: int = 1, environment: Any = None
@@ -260,8 +271,7 @@ class CompiledStatics:
         motors, loads = without(motors, bad, self._model.relaxed_motors), without(loads, bad)
         if environment is not None:
             wrenches = np.hstack([loads, np.tile(down, (len(loads), 1))])
-            self._touching = self._touching or ContactSolver(self._model, self._unknowns, self._backend)
-            return self._touching.settle(motors, wrenches, bad, environment, threads)
+            return self._solver_in_contact().settle(motors, wrenches, bad, environment, threads)
         layout = run.layout
         inputs = [(layout.force, loads), (layout.gravity, down[None]), *self._actuation.rows(motors, layout)]
         results = [(layout.unknown, layout.unknowns), (layout.tip, 3), (layout.single("error"), 1)]

@@ -13,20 +13,25 @@ import numpy as np
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.contact import balance, candidates, joints, programme, search, surfaces
 from softrobots.compiled.program.generated_module import functions_of
+from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.backends import jitted
-from softrobots.compiled.run.results import EquilibriumBatch
+from softrobots.compiled.run.batches import gravity_vector
+from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import FloatArray, positive_integer
+from softrobots.core.checks import FloatArray, finite_array, positive_integer
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
+from softrobots.core.summary import Part, facts, field_facts
 from softrobots.environment.cores import cores_of
-from softrobots.environment.environment import Environment, fixed_environment
+from softrobots.environment.environment import Environment, check_environment, fixed_environment
 from softrobots.environment.obstacle_fields import obstacle_transforms
 from softrobots.environment.obstacles import Box, Capsule, Cylinder, HalfSpace, Sphere
+from softrobots.environment.standing import check_base
 from softrobots.model.serial_chain import ChainJoint
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.statics.stability import NEUTRAL
 
+_GOOD = np.zeros(1, dtype=np.bool_)
 _CHUNK = 64  # cases that a thread takes at a time
 _KINDS = {HalfSpace: surfaces.HALF_SPACE, Box: surfaces.ROUNDED_BOX, Sphere: surfaces.ROUNDED_BOX}
 _KINDS |= {Capsule: surfaces.ROUNDED_BOX, Cylinder: surfaces.CYLINDER}
@@ -52,6 +57,30 @@ class ContactBatch(EquilibriumBatch):
     """Depth of the deepest penetration, shape (n,) [m]."""
     handed_over: Any
     """Mask of the cases that `softrobots.solve_equilibrium` solved, shape (n,): slower, with the same certificate."""
+
+
+class ContactEquilibrium(CompiledEquilibrium):
+    """An equilibrium in contact without friction, certified stable or neutral."""
+
+    __slots__ = ("handed_over", "obstacle_forces", "penetration")
+
+    def __init__(self, workspace: Any, run: Any, actuation: Actuation, motors: FloatArray, found: ContactBatch) -> None:
+        """Take a workspace of code without contact, and the only case of a batch."""
+        layout = run.layout
+        for place, numbers in ((layout.unknown, found.q_springs), (layout.tip, found.tip_positions)):
+            run.put(workspace, place, numbers[0])
+        run.put(workspace, layout.single("error"), found.residual**2)
+        super().__init__(workspace, layout, actuation, motors, Status(int(found.status[0])))
+        self.obstacle_forces: FloatArray = found.obstacle_forces[0]
+        """Force of each obstacle on the robot, shape (n_obstacles, 3) [N], world axes, in the order of the environment."""
+        self.penetration = float(found.penetration[0])
+        """Depth of the deepest penetration [m]."""
+        self.handed_over = bool(found.handed_over[0])
+        """Whether `softrobots.solve_equilibrium` solved it."""
+
+    def summary_parts(self) -> list[Part]:
+        """Return the equilibrium, and the forces of the obstacles."""
+        return [*super().summary_parts(), facts(field_facts(self, "obstacle_forces", "penetration"))]
 
 
 class ContactSolver:
@@ -83,7 +112,17 @@ class ContactSolver:
             np.array(chain.rest),
         )
         self._model, self._capsules = model, _capsules(model, elements)
+        self._around: tuple[Any, FloatArray] = (None, np.zeros((0, 0, surfaces.ROW)))  # the last environments, as numbers
         self._run: Any = _compiled if backend == "numba" else lambda: search
+
+    def equilibrium(
+        self, actuation: Actuation, run: Any, q_motors: Any, force: Any, gravity: Any, environment: Any
+    ) -> ContactEquilibrium:
+        """Settle one case, see `CompiledStatics.equilibrium`; what is known of the last environment is kept."""
+        motors, load = actuation.checked(q_motors), finite_array("force", force, (3,), "N")
+        wrench = np.concatenate([load, gravity_vector(gravity)])
+        found = self.settle(motors[None], wrench[None], _GOOD, check_environment(environment), 1)
+        return ContactEquilibrium(actuation.workspace(run, motors, force=load), run, actuation, motors, found)
 
     def settle(self, motors: FloatArray, loads: FloatArray, bad: Any, environment: Any, threads: int) -> ContactBatch:
         """Settle cases, each from rest; see `CompiledStatics.equilibria`."""
@@ -95,7 +134,11 @@ class ContactSolver:
             requirement = f"one, or {n} with obstacles of the same names, one a case"
             raise ParameterError("environment", f"{len(around)} environments", requirement)
         threads = positive_integer("threads", threads)
-        bodies = np.array([bodies_of(one) for one in around])
+        known, bodies = self._around
+        if around != known:
+            check_base(self._model, around)
+            bodies = np.array([bodies_of(one) for one in around])
+            self._around = around, bodies
         springs, tips = np.tile(self._model.rest, (n, 1)), np.zeros((n, 3))
         pushes, told, done = np.zeros((n, 3 * bodies.shape[1])), np.zeros((n, 2)), np.zeros(n, dtype=np.bool_)
         given = self._chain, self._capsules, bodies, motors, loads, springs, tips, pushes, told, done

@@ -98,6 +98,11 @@ class CompiledEquilibrium(Summarised):
         """Norm of the out-of-balance torque of the elastic coordinates [N m]."""
         return self._root("error")
 
+    @property
+    def iterations(self) -> int:
+        """Evaluations that the search took."""
+        return int(self._workspace[self._layout.single("iterations")])
+
     def _root(self, name: str) -> float:
         return math.sqrt(self._workspace[self._layout.single(name)])
 

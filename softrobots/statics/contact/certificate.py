@@ -44,7 +44,7 @@ def active_contacts(touch: Touch, reach: float, rounding: float) -> ActiveContac
         rounding: Residual that counts as none [N m]; a force that loads the springs by less is none.
     """
     touching = (touch.gaps.values <= TOUCHING * reach) | (touch.forces > 0.0)
-    pressed = touch.forces * np.sqrt(np.einsum("ij,ij->i", touch.rows, touch.rows)) > rounding
+    pressed = touch.forces * np.sqrt(np.vecdot(touch.rows, touch.rows)) > rounding
     return ActiveContacts(touching.nonzero()[0], pressed.nonzero()[0], (touching & ~pressed).nonzero()[0])
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import Protocol
 
@@ -15,14 +16,18 @@ EVENT = 2.0**-7
 """Largest step in which a contact is made or lost or begins to slip or stick, likewise."""
 
 
+PATIENT = 2.0**-4
+"""Largest step that is tried again where Newton's method does not converge at once: halving a larger one takes less."""
+
+
 class Way(Protocol):
     """What a robot follows: places 0, 1, 2, ... and all between two."""
 
     def parameter(self, place: float) -> float:
         """Parameter at a place."""
 
-    def step(self, place: float, here: Rest) -> Rest | None:
-        """Go to a place; None if there is no equilibrium that holds near the last one."""
+    def step(self, place: float, here: Rest, small: bool = True) -> Rest | None:
+        """Go to a place; None if there is no equilibrium that holds near the last one, or it is too far for a step so large."""
 
     def blocked(self, place: float, here: Rest) -> Rest | None:
         """Go to a place that the smallest step does not reach; None: the way ends."""
@@ -33,7 +38,7 @@ class ContactWalk:
 
     def __init__(self, way: Way) -> None:
         """Take the way."""
-        self._way, self._share = way, 0.25
+        self._way, self._share, self._waits = way, 0.25, False
         self.events: list[ContactEvent] = []
         self.work = 0.0
         """Work against friction so far [J]."""
@@ -50,20 +55,29 @@ class ContactWalk:
 
     def go(self, here: Rest, place: float) -> Rest | None:
         """Go from one place to the next whole number; None where the way ends."""
-        end = place + 1.0
+        end, changed = place + 1.0, math.inf
         while place < end:
             aim = min(place + self._share, end)
-            there = self._way.step(aim, here)
+            if aim >= changed:  # statuses are known to be others there
+                aim = 0.5 * (place + changed) if changed - place > EVENT else changed
+            there = self._way.step(aim, here, aim - place <= PATIENT)
             if there is None and aim - place <= SMALLEST:
                 there = self._way.blocked(aim, here)
                 if there is None:
                     return None
-            elif there is None or (aim - place > EVENT and there.statuses != here.statuses):
-                self._share = max(0.5 * (aim - place), SMALLEST)
+            elif there is None:
+                self._share, self._waits = max(0.5 * (aim - place), SMALLEST), True
+                continue
+            elif aim - place > EVENT and there.statuses != here.statuses:
+                changed = aim
                 continue
             self._tell(here.statuses, there.statuses, self._way.parameter(aim))
             self.work += there.work
-            here, place, self._share = there, aim, min(2.0 * self._share, 1.0)
+            if there.statuses != here.statuses:
+                self._share, changed, self._waits = 2.0 * (aim - place), math.inf, False
+            elif changed == math.inf and not self._waits:
+                self._share = min(2.0 * self._share, 1.0)
+            here, place, self._waits = there, aim, False
         return here
 
     def _tell(self, before: dict[tuple[str, str], str], after: dict[tuple[str, str], str], parameter: float) -> None:

@@ -38,7 +38,7 @@ def contact_step(
     gaps: FloatArray,
     rows: FloatArray,
     held: Any,
-    stiffness: FloatArray,
+    soft: FloatArray,
     limits: tuple[float, float],
     factors: Any,
 ) -> Step | None:
@@ -50,7 +50,7 @@ def contact_step(
         gaps: Gaps, shape (m,) [m].
         rows: Their gradients, shape (m, n).
         held: Which are taken to be pressed, shape (m,), truth values; the Hessian is made positive beside them.
-        stiffness: Stiffness of the springs, shape (n,).
+        soft: One over the square root of the stiffness of the springs, shape (n,).
         limits: Length of a step beyond which its components are limited to that, each by itself; and stiffness that is added
             to shorten it, relative to the springs.
         factors: An `eigenpy.LDLT` of size n.
@@ -58,7 +58,6 @@ def contact_step(
     Returns:
         The step; None if the solver fails.
     """
-    soft = 1.0 / np.sqrt(stiffness)
     gradients, (longest, damping) = rows * soft, limits
     pull = soft * load
     relative = soft[:, None] * hessian * soft
@@ -80,23 +79,21 @@ def contact_step(
 
 
 def nearest_step(
-    wanted: FloatArray, gaps: FloatArray, rows: FloatArray, stiffness: FloatArray, closed: Any = None
+    wanted: FloatArray, gaps: FloatArray, rows: FloatArray, soft: FloatArray, closed: Any = None
 ) -> FloatArray | None:
     """Return the step nearest to one that is wanted, in the measure of the springs, that keeps the linearised gaps.
 
     Those of `closed`, shape (m,), truth values, become zero; None if no step does that.
     """
-    soft = 1.0 / np.sqrt(stiffness)
     found = solve_programme(np.eye(len(soft)), -wanted / soft, rows * soft, -gaps, closed)
     return None if found is None else np.asarray(soft * found[0])
 
 
-def repairing_step(gaps: FloatArray, rows: FloatArray, stiffness: FloatArray, longest: float) -> FloatArray | None:
+def repairing_step(gaps: FloatArray, rows: FloatArray, soft: FloatArray, longest: float) -> FloatArray | None:
     """Return the shortest step, in the measure of the springs, that opens linearised penetrations as far as can be.
 
     No component is larger than `longest`.
     """
-    soft = 1.0 / np.sqrt(stiffness)
     found = _within(np.eye(len(soft)), np.zeros(len(soft)), rows * soft, gaps, longest / soft)
     return None if found is None else np.asarray(soft * found[0])
 

@@ -47,7 +47,7 @@ FORCED = 1e-4
 _STILL = 1e-10  # [rad], Newton step after which no motion of the springs brings the equations any nearer
 
 
-def solve_step(step: Step, start: FloatArray, coefficient: float) -> tuple[Balance | None, int]:
+def solve_step(step: Step, start: FloatArray, coefficient: float, *, patient: bool = True) -> tuple[Balance | None, int]:
     """Solve a step from elastic coordinates, shape (n,).
 
     First by full Newton steps; where these do not converge, by steps that are halved while they do not lower the norm of all
@@ -57,12 +57,13 @@ def solve_step(step: Step, start: FloatArray, coefficient: float) -> tuple[Balan
         step: The robot.
         start: Elastic coordinates to start from, shape (n,).
         coefficient: Friction coefficient.
+        patient: Whether to go on by halved steps.
 
     Returns:
         The equilibrium, None if there is none or it is not found; and the evaluations spent.
     """
     start_place, spent = step.mark(), 0
-    for halvings, most in ((1, _FULL_STEPS), (_HALVINGS, MOST_EVALUATIONS)):
+    for halvings, most in ((1, _FULL_STEPS), (_HALVINGS, MOST_EVALUATIONS))[: 2 if patient else 1]:
         step.return_to(start_place)
         here, first = _balance(step, start, np.zeros(0), np.zeros((0, 2)), coefficient, step.stiffness, True), spent
         spent += 1

@@ -64,6 +64,7 @@ class ContactSearch:
         self.problem, self.most, self.spent = problem, most, 0
         """The robot under its load, the limit, and the evaluations spent."""
         self._stiffness, self._reach = problem.model.stiffness, problem.model.reach
+        self._soft = 1.0 / np.sqrt(self._stiffness)
         self._factors, self._price, self._damping = LDLT(len(self._stiffness)), 0.0, 0.0
 
     def near(self, springs: FloatArray, forces: ForceTable = NO_FORCES, seen: float = NEAR) -> Near | None:
@@ -106,13 +107,11 @@ class ContactSearch:
     def step(self, here: Near) -> Step | None:
         """Step of the quadratic programme over the gaps that it can close."""
         touch, values = here.touch, here.touch.gaps.values
-        sizes = np.sqrt(np.einsum("ij,ij->i", touch.rows, touch.rows))
+        sizes = np.sqrt(np.vecdot(touch.rows, touch.rows))
         near = (values <= _LARGEST_STEP * sizes).nonzero()[0]
         rows, held = touch.rows.take(near, 0), touch.forces.take(near) > 0.0
         limits = _LARGEST_STEP, self._damping
-        found = contact_step(
-            here.state.tangent, here.load, values.take(near), rows, held, self._stiffness, limits, self._factors
-        )
+        found = contact_step(here.state.tangent, here.load, values.take(near), rows, held, self._soft, limits, self._factors)
         if found is None:
             return None
         forces = np.zeros(len(values))
@@ -124,7 +123,7 @@ class ContactSearch:
         longest = _LARGEST_STEP
         while here.touch.penetration > _DEEP * self._reach and longest > _SHORTEST and self.spent < self.most:
             touch = here.touch
-            step = None if self.blocked(here) else repairing_step(touch.gaps.values, touch.rows, self._stiffness, longest)
+            step = None if self.blocked(here) else repairing_step(touch.gaps.values, touch.rows, self._soft, longest)
             if step is None:
                 break
             promised = touch.penetration - max(0.0, -float((touch.gaps.values + touch.rows @ step).min()))
@@ -160,7 +159,7 @@ class ContactSearch:
             closing = np.where(gaps > TOUCHING * self._reach, -(touch.rows @ wanted), 0.0)
             longest = float((gaps[closing > 0.0] / closing[closing > 0.0]).min(initial=np.inf))
             size = min(_ESCAPE, 0.5 * longest)
-            step = nearest_step(size * wanted, gaps, touch.rows, self._stiffness)
+            step = nearest_step(size * wanted, gaps, touch.rows, self._soft)
             if step is not None and float(step @ state.tangent @ step) < 0.0 and norm(step) > 0.1 * size:
                 return False, Step(step, touch.forces, False)
         return False, None
@@ -197,7 +196,7 @@ class ContactSearch:
             table = ForceTable.of(touch.gaps, touch.forces + share * change)
             trial = self.near(state.q_springs + share * whole, table, seen)
             if share == 1.0 and trial is not None and not better(trial, share):
-                back = _back_to_surface(trial.touch, self._stiffness)
+                back = _back_to_surface(trial.touch, self._soft)
                 if back is not None and norm(back) <= norm(whole):
                     trial = self.near(trial.state.q_springs + back, table, seen)
             if trial is not None and better(trial, share):
@@ -216,6 +215,6 @@ def _moved(step: FloatArray) -> float:
     return norm(step) * math.sqrt(len(step))
 
 
-def _back_to_surface(touch: Touch, stiffness: FloatArray) -> FloatArray | None:
+def _back_to_surface(touch: Touch, soft: FloatArray) -> FloatArray | None:
     """Shortest step that closes the gaps with a force and opens penetrations."""
-    return nearest_step(np.zeros(len(stiffness)), touch.gaps.values, touch.rows, stiffness, touch.forces > 0.0)
+    return nearest_step(np.zeros(len(soft)), touch.gaps.values, touch.rows, soft, touch.forces > 0.0)

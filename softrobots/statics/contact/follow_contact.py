@@ -12,7 +12,7 @@ from softrobots.core.checks import FloatArray, finite_array, increasing, non_neg
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.core.progress import with_progress
 from softrobots.environment.environment import check_environment
-from softrobots.environment.gaps import Surroundings
+from softrobots.environment.standing import standing_among
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_path import ContactJump, ContactPath
@@ -164,7 +164,7 @@ class Course:
         load = Load.of(model, row.get("force"), wrench=wrench, frame=self._frame, gravity=row.get("gravity"))
         environment = self._environment.at(parameter)
         if (model, environment) != self._last[:2]:
-            self._last = (model, environment, Surroundings(model, environment))
+            self._last = (model, environment, standing_among(model, environment))
         motors = model.actuators.checked(row["q_motors"])
         return Given(model, motors, replace(load, environment=environment), environment, self._last[2])
 
@@ -177,9 +177,9 @@ class _Driven:
         self.jumps: list[ContactJump] = []
         self.ended = ""
 
-    def step(self, place: float, here: Rest) -> Rest | None:
+    def step(self, place: float, here: Rest, small: bool = True) -> Rest | None:
         """Go to a place; None if there is no equilibrium that holds near the last one."""
-        return step(self._given_at(place), here)
+        return step(self._given_at(place), here, patient=small)
 
     def blocked(self, place: float, here: Rest) -> Rest | None:
         """Where a robot comes to rest that has no equilibrium near; None if jumps are not allowed.

@@ -67,7 +67,7 @@ def solve_guessed(
     solution, multipliers[chosen] = free + gives.dot(forces), forces
     if len(chosen) == len(bounds):
         return solution, multipliers
-    broken = gradients.dot(solution) - bounds < -_BROKEN * np.sqrt(np.einsum("ij,ij->i", gradients, gradients))
+    broken = gradients.dot(solution) - bounds < -_BROKEN * np.sqrt(np.vecdot(gradients, gradients))
     broken[chosen] = False
     return None if broken.any() else (solution, multipliers)
 
@@ -86,7 +86,7 @@ def _by_rows(
 ) -> tuple[FloatArray, FloatArray] | None:
     """The same, rows taken in where the solution of the others breaks them: most of many surfaces are not touched."""
     chosen = np.zeros(len(bounds), dtype=bool)
-    sizes = np.sqrt(np.einsum("ij,ij->i", gradients, gradients))
+    sizes = np.sqrt(np.vecdot(gradients, gradients))
     while True:
         places = chosen.nonzero()[0]
         found = _solved(hessian, pull, gradients[places], bounds[places], None, box)

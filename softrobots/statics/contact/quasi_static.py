@@ -75,11 +75,11 @@ class Rest(NamedTuple):
         return self.robot.equilibrium(self.found, self.iterations)
 
 
-def settle(given: Given, last: Sliding, start: FloatArray, brake: float = 0.0) -> Rest | None:
+def settle(given: Given, last: Sliding, start: FloatArray, brake: float = 0.0, *, patient: bool = True) -> Rest | None:
     """Solve one step from elastic coordinates, shape (n_springs,); None if it does not converge to a state that holds."""
     with one_blas_thread(given.model.n_springs):
         robot = SlidingRobot(given, last, brake)
-        found, spent = solve_step(robot, start, last.friction)
+        found, spent = solve_step(robot, start, last.friction, patient=patient)
         if found is None or not robot.holds(found):
             return None
         return Rest(robot, found, robot.work(found), spent)
@@ -91,10 +91,13 @@ def at_rest(given: Given, start: Equilibrium, friction: float) -> Rest | None:
     return settle(given, Sliding(friction, gaps, forces_of(gaps, start.contacts)), start.q_springs)
 
 
-def step(given: Given, last: Rest) -> Rest | None:
-    """Go on to what is given at the next place; None if there is no equilibrium that holds near the last one."""
+def step(given: Given, last: Rest, *, patient: bool = True) -> Rest | None:
+    """Go on to what is given at the next place; None if there is no equilibrium that holds near the last one.
+
+    One that full Newton steps do not find is looked for only with `patient`.
+    """
     sliding, start = carried_over(given, last)
-    there = settle(given, sliding, start)
+    there = settle(given, sliding, start, patient=patient)
     return None if there is None or change(given.model, there.q_springs, start) > FAR else there
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Gaps, Surroundings
+from softrobots.environment.standing import standing_among
 from softrobots.model.coordinates import Point
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
@@ -60,9 +61,7 @@ class ForceTable(NamedTuple):
     @classmethod
     def of(cls, gaps: Gaps, forces: FloatArray) -> ForceTable:
         """Take the forces on candidates, shape (m,) [N]."""
-        places = forces.nonzero()[0]
-        columns = (column.take(places).tolist() for column in (gaps.capsules, gaps.obstacles, gaps.features, forces))
-        return cls(tuple(zip(*columns, strict=True)))
+        return cls(tuple((*key, force) for key, force in zip(gaps.keys, forces.tolist(), strict=True) if force != 0.0))
 
     def at(self, gaps: Gaps) -> FloatArray:
         """Forces on other candidates, shape (m,) [N]; zero on new ones.
@@ -70,11 +69,15 @@ class ForceTable(NamedTuple):
         The force on a candidate that is no longer there passes to the nearest other one of the same pair of bodies.
         """
         forces = np.zeros(len(gaps.values))
+        places = dict(zip(gaps.keys, range(len(forces)), strict=True)) if self.entries else {}
         for capsule, obstacle, feature, force in self.entries:
+            same = places.get((capsule, obstacle, feature))
+            if same is not None:
+                forces[same] += force
+                continue
             pair = ((gaps.capsules == capsule) & (gaps.obstacles == obstacle)).nonzero()[0]
             if len(pair):
-                same = pair[gaps.features[pair] == feature]
-                forces[same[0] if len(same) else pair[gaps.values[pair].argmin()]] += force
+                forces[pair[gaps.values[pair].argmin()]] += force
         return forces
 
 
@@ -99,7 +102,7 @@ class NearSurfaces:
         """Take the robot and its environment."""
         known = _KNOWN.by_model.get(model)
         if known is None or known[0] is not environment:
-            known = _KNOWN.by_model[model] = environment, Surroundings(model, environment)
+            known = _KNOWN.by_model[model] = environment, standing_among(model, environment)
         self._surroundings, self._reach = known[1], model.reach
 
     def at(self, q: FloatArray, point: Point, forces: ForceTable, near: float) -> Touch:
@@ -110,7 +113,7 @@ class NearSurfaces:
         gaps = self._surroundings.at(q, near * self._reach)
         on_motors, on_springs = point.columns(gaps.jacobian)
         each = forces.at(gaps)
-        deepest = max(0.0, -float(gaps.values.min())) if len(gaps.values) else 0.0
+        deepest = max(0.0, -float(np.minimum.reduce(gaps.values))) if len(gaps.values) else 0.0
         return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._surroundings, deepest)
 
 

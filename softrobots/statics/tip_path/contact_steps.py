@@ -22,7 +22,7 @@ from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import EquilibriumNotFound, NeutralEquilibrium, TargetUnreachable
 from softrobots.core.progress import with_progress
 from softrobots.environment.environment import check_environment
-from softrobots.environment.gaps import Surroundings
+from softrobots.environment.standing import standing_among
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_laws import Balance
 from softrobots.statics.contact.contact_path import ContactPath
@@ -142,7 +142,7 @@ class TargetWay:
         """Take the robot, the waypoints with their times, shape (n,), the load with the obstacles, and the tolerance [m]."""
         self._model, self._goals, self._times, self._load, self._tolerance = model, goals, times, load, tolerance
         self._environment = check_environment(load.environment)
-        self._surroundings = Surroundings(model, self._environment)
+        self._surroundings = standing_among(model, self._environment)
 
     def parameter(self, place: float) -> float:
         """Time at a place [s]."""
@@ -152,7 +152,7 @@ class TargetWay:
         """What is given at motors."""
         return Given(self._model, motors, self._load, self._environment, self._surroundings)
 
-    def step(self, place: float, here: Rest) -> Rest | None:
+    def step(self, place: float, here: Rest, small: bool = True) -> Rest | None:
         """Put the tip to the target of a place; None if no small step of the robot does."""
         number = min(int(place), len(self._goals) - 2)
         goal = self._goals[number].between(self._goals[number + 1], place - number)
