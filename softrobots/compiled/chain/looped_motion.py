@@ -146,20 +146,20 @@ def _trace_kind(
         total = total if joint.shift is None else moved_wrench(total, joint.shift)
     back.store_all(places.wrench, total.tolist())
     gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
-    blocks, layout = [out, factor, back, step, place], plan.layout
-    if layout.in_stages:
-        back.store_all(layout.forces + layout.unknowns, gradient, "q")
-        back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at both stages.", names, out.trace)
+    blocks, layout, n = [out, factor, back, step, place], plan.layout, places.unknowns
+    if plan.reduces:
+        written, read = plan.torques
+        back.store_all(written + (n if layout.in_stages else 0), gradient, "q")
+        back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
         blocks.append(back)
-        both = (back.loads(layout.forces + stage * layout.unknowns, len(gradient), "q") for stage in range(2))
-        gradient = right_hand_side(*both)
+        stages = [back.loads(read + stage * n, len(gradient), "q") for stage in range(places.parts)]
+        gradient = right_hand_side(*stages) if layout.in_stages else [*stages[0]]
     reduced, sums = carried_inward(factors, gradient, _loaded(back, places.sums, 6, places))
     _store(back, places.sums, sums, places)
     kept = record.keep(back, vector(reduced)).tolist()
     steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6, places))
-    stages = corrections(steps) if layout.in_stages else (steps.tolist(),)
-    for stage, one in enumerate(stages):
-        step.store_all(layout.correction + stage * layout.unknowns, one, "q")
+    for stage, one in enumerate(corrections(steps) if layout.in_stages else (steps.tolist(),)):
+        step.store_all(plan.correction + stage * n, one, "q")
     _store(step, places.answer, answer, places)
     _trace_place(place, places, group)
     return Kind(number, [group[0] for group in groups], blocks, columns, record.size)

@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from softrobots.compiled.chain.held_motion import moving_coordinates
 from softrobots.compiled.chain.layout import assign_places
+from softrobots.compiled.chain.motion_routes import MotionRoutes
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.motion_settings import KEPT_STEPS
 from softrobots.compiled.trace.blocks import Block
@@ -21,14 +23,15 @@ _OF_STAGES = ("stages", "forces")  # places only of a method with two stages
 class MotionLayout:
     """Places in the workspace of a step of time, in this order.
 
-    `n` unknowns, `m` actuators. Straight-line functions read motors, force, gravity, damping, time step, `unknown`, `rate`
-    and `acceleration`, and write `correction` and `tip`; all else is for the drivers.
+    `n` unknowns, the strains or with given lengths the free coordinates, and `m` actuators. Straight-line functions read
+    motors, force, gravity, damping, time step, `unknown`, `rate` and `acceleration`, and write `correction` and `tip`; all else
+    is for the drivers.
     """
 
     motors: int
     """Number of actuators, motor joints and then muscles; their coordinates in the middle of the step come first (m)."""
     unknowns: int
-    """Number of unknown strains."""
+    """Number of unknowns."""
     full_damping: bool = False
     """Whether the damping is a matrix rather than a number for each unknown."""
     order: int = 2
@@ -135,7 +138,38 @@ class MotionPlan:
     @cached_property
     def layout(self) -> MotionLayout:
         """Places of the numbers of a case."""
-        return MotionLayout(len(self.unknowns.chain.limits), len(self.unknowns.strains), self.full_damping, self.order)
+        unknowns = self.unknowns
+        count = len(moving_coordinates(unknowns))
+        return MotionLayout(len(unknowns.chain.limits), count, self.full_damping, self.order)
+
+    @cached_property
+    def routes(self) -> MotionRoutes | None:
+        """Places of actuators on routes and of the strains that they hold; None without any."""
+        layout = self.layout
+        return MotionRoutes(self.unknowns, layout.prepared, 2 if layout.in_stages else 1) if self.unknowns.routed else None
+
+    @property
+    def strains(self) -> tuple[int, int, int, int]:
+        """Place of the unknown strains, their rates, accelerations and dampers."""
+        layout, routes = self.layout, self.routes
+        if routes is None or not routes.held:
+            return layout.unknown, layout.rate, layout.acceleration, layout.damping
+        return routes.strain, routes.strain_rate, routes.strain_change, routes.strain_damping
+
+    @property
+    def correction(self) -> int:
+        """Place of the correction of the accelerations of the strains."""
+        return self.layout.correction if self.routes is None or not self.routes.held else self.routes.correction
+
+    @property
+    def reduces(self) -> bool:
+        """Whether torques out of balance are written first, and eliminated in a pass of their own."""
+        return self.layout.in_stages or self.routes is not None
+
+    @property
+    def torques(self) -> tuple[int, int]:
+        """Where torques out of balance are written, and where they are read to be eliminated, at all stages."""
+        return (self.layout.forces, self.layout.forces) if self.routes is None else (self.routes.torques, self.routes.sides)
 
     def factors(self, block: Block) -> tuple[Scalar, Scalar]:
         """Return the factors of damping and stiffness in the matrix of a step: `h/2` and `h^2/4`, or complex ones."""

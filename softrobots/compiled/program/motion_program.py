@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from softrobots.compiled import motion_settings
+from softrobots.compiled.chain.held_motion import in_motion
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.time_step import step_blocks
 from softrobots.compiled.chain.unknowns import Unknowns
@@ -28,9 +29,6 @@ def check_motion(unknowns: Unknowns, *, full_damping: bool = False) -> None:
         ParameterError: If the motion of its actuators is not compiled, or the damping of a long chain is a matrix.
     """
     what = "a damping matrix (mass_damping)" if full_damping and not unknowns.is_unrolled else ""
-    if unknowns.chain.routed:
-        what = "actuators but those of given tension, each straight along one segment"
-    what = "given muscle lengths" if unknowns.chain.constrained else what
     if what:
         raise ParameterError("model", unknowns.chain.name, f"a robot without {what}, to have its motion compiled")
 
@@ -42,9 +40,9 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order
         ParameterError: If the motion of its actuators is not compiled, or the damping of a long chain is a matrix.
     """
     check_motion(unknowns, full_damping=full_damping)
-    plan = MotionPlan(unknowns, full_damping, order)
+    plan = MotionPlan(in_motion(unknowns), full_damping, order)
     layout = plan.layout
-    parts = unrolled_motion(plan) if unknowns.is_unrolled else looped_motion(plan)
+    parts = unrolled_motion(plan) if plan.unknowns.is_unrolled else looped_motion(plan)
     blocks = [*parts.blocks, *step_blocks(layout)]
     docstring, places = _manual(plan)
     values: dict[str, object] = {name: value for name, value in vars(motion_settings).items() if name.isupper()}
