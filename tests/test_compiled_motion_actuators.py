@@ -62,29 +62,31 @@ def inputs(model: sr.SoftModel, rng: np.random.Generator) -> np.ndarray:
 def close(found: Any, expected: Any, steps: int, h: float) -> None:
     """Two runs at the same steps: each step is solved to 1e-13 of a radian or metre, and a velocity to that over the step."""
     np.testing.assert_allclose(found.tip_position, expected.tip_position, rtol=0, atol=1e-9 * expected.model.reach)
-    np.testing.assert_allclose(found.q_springs, expected.q_springs, rtol=0, atol=1e-9 * np.abs(expected.q_springs).max())
+    np.testing.assert_allclose(
+        found.q_springs, expected.q_springs, rtol=0, atol=1e-9 * np.abs(expected.q_springs).max() + steps * 1e-12
+    )
     left = 1e-9 * np.abs(expected.velocities).max() + steps * 2e-13 / h
     np.testing.assert_allclose(found.velocities, expected.velocities, rtol=0, atol=left)
 
 
-@pytest.mark.parametrize("order", [2, 4])
-@pytest.mark.parametrize("name", ARMS)
+@pytest.mark.parametrize(("name", "order"), [(name, 4 if place % 2 else 2) for place, name in enumerate(ARMS)])
 def test_a_released_robot_moves_as_simulate_says(name: str, order: int, rng: np.random.Generator) -> None:
-    """From relaxed springs, under its weight, a force and inputs that differ from those at rest."""
-    model, h = robot(name), 1e-3
-    given = {"force": (0.2, 0.1, -0.1), "gravity": GRAVITY, "damping_time": 0.005, "time_step": h, "order": order}
+    """From relaxed springs, under its weight, a force and inputs that differ from those at rest, damped by the file or not."""
+    model, h, steps = robot(name), 1e-3, 6
+    given = {"force": (0.2, 0.1, -0.1), "gravity": GRAVITY, "time_step": h, "output_step": h, "order": order}
+    given["mass_damping"] = 5.0
     motors = inputs(model, rng)
-    expected = sr.simulate(model, 8 * h, motors, output_step=2 * h, **given)
-    found = solver(name).simulate(8 * h, motors, output_step=2 * h, **given)
+    expected = sr.simulate(model, steps * h, motors, **given)
+    found = solver(name).simulate(steps * h, motors, **given)
     assert np.abs(expected.q_springs[-1] - expected.q_springs[0]).max() > 1e-4
-    close(found, expected, 8, h)
+    close(found, expected, steps, h)
     np.testing.assert_allclose(found.energy.elastic, expected.energy.elastic, rtol=1e-8, atol=1e-12)
 
 
-@pytest.mark.parametrize("name", ["tendons", "winding lengths", "lengths on an arm"])
+@pytest.mark.parametrize("name", ["tendons", "lengths", "winding lengths"])
 def test_inputs_may_move(name: str, rng: np.random.Generator) -> None:
     """Motors of tendons, lengths and motor joints that swing, one robot by itself and two side by side."""
-    model, h, steps = robot(name), 1e-3, 10
+    model, h, steps = robot(name), 1e-3, 6
     change = inputs(model, rng) - model.relaxed_motors
 
     def path(t: float) -> np.ndarray:
@@ -96,20 +98,20 @@ def test_inputs_may_move(name: str, rng: np.random.Generator) -> None:
     batch = solver(name).simulations(steps * h, [path, lambda t: path(0.5 * t)], **given)
     assert batch.certified.all()
     # A batch lets the springs jump with the first rate of a path, found by differences, however small it is.
-    np.testing.assert_allclose(batch.tip_position[0], expected.tip_position, rtol=0, atol=1e-5 * model.reach)
-    assert np.abs(batch.tip_position[1] - batch.tip_position[0]).max() > 1e-4
+    np.testing.assert_allclose(batch.tip_position[0], expected.tip_position, rtol=0, atol=1e-6 * model.reach)
+    assert np.abs(batch.tip_position[1] - batch.tip_position[0]).max() > 1e-5
 
 
 @pytest.mark.parametrize("order", [2, 4])
 @pytest.mark.parametrize("name", ["tendons", "winding", "lengths", "winding lengths"])
 def test_a_step_solves_the_equations_of_motion(name: str, order: int, rng: np.random.Generator) -> None:
-    """Pinocchio's equations at the stages of one step from a fast random state; damped by a number for each coordinate."""
+    """Pinocchio's equations at the stages of one step from a fast random state; damped by a number for each strain."""
     model, h = robot(name), 5e-4
     n, m, motors = model.n_springs, model.n_motors, inputs(model, rng)
     run: Any = make_run(make_motion_program(Unknowns(model.chain()), order=order), "python")
     layout, w = run.layout, run.workspace()
     y0, v0 = model.rest + 2e-3 * rng.normal(size=n), 0.5 * rng.normal(size=n)
-    damping = 1e-3 * model.stiffness * rng.uniform(0.5, 1.5, n)
+    damping = 1e-3 * model.chain().stiffness * rng.uniform(0.5, 1.5, len(model.chain().stiffness))
     state = {"position": y0, "velocity": v0, "gravity": np.array(GRAVITY), "time_step": np.array([h]), "damping": damping}
     for key, values in (state | dict.fromkeys(("motors_begin", "motors_middle", "motors_end"), motors)).items():
         run.put(w, getattr(layout, key), values)
@@ -118,7 +120,8 @@ def test_a_step_solves_the_equations_of_motion(name: str, order: int, rng: np.ra
     a = np.array(w[place : place + count * n]).reshape(count, n)
     squares, weights = (np.array(SQUARES), np.array(WEIGHTS)) if order == 4 else (np.full((1, 1), 0.25), np.full((1, 1), 0.5))
     shares = np.array(STAGES if order == 4 else (0.5,))[:, None]
-    equations, still = EquationsOfMotion(model, GRAVITY, np.diag(damping)), np.zeros(m)
+    free = model.chain().free  # of the strains, without given lengths the identity
+    equations, still = EquationsOfMotion(model, GRAVITY, free.T @ (damping[:, None] * free)), np.zeros(m)
     y, v = y0 + h * shares * v0 + h * h * squares @ a, v0 + h * weights @ a
     for stage in range(count):
         x, rates, changes = (np.concatenate(parts) for parts in ((motors, y[stage]), (still, v[stage]), (still, a[stage])))
@@ -128,40 +131,48 @@ def test_a_step_solves_the_equations_of_motion(name: str, order: int, rng: np.ra
         assert np.abs(error).max() < 1e-12 * size
 
 
-@pytest.mark.parametrize(("name", "order"), [("tendons", 2), ("winding", 4), ("winding lengths", 2), ("lengths", 4)])
+def excited(name: str, rng: np.random.Generator) -> tuple[sr.SoftModel, np.ndarray, np.ndarray]:
+    """A robot, inputs that pull all tendons, and velocities that displace the tip by a centimetre in some milliseconds."""
+    model = robot(name)
+    tight = {"elastic": -2e-3, "tension": 4.0, "pressure": 4e4, "mckibben": 4e4, "length": 0.0}
+    motors = model.relaxed_motors + np.array([tight[tag.kind] for tag in model.muscles])
+    return model, motors, np.where(model.springs.turning, 3.0, 0.01) * rng.normal(size=model.n_springs)
+
+
+@pytest.mark.parametrize(("name", "order"), [("tendons", 4), ("winding", 2), ("winding lengths", 2), ("lengths", 4)])
 def test_undamped_motion_runs_backwards(name: str, order: int, rng: np.random.Generator) -> None:
     """Both methods are symmetric in time: with reversed velocities a robot goes back to where it came from."""
-    model, motors = robot(name), inputs(robot(name), rng)
-    start = model.rest + 1e-3 * rng.normal(size=model.n_springs)
-    springs, rates = start, np.zeros(model.n_springs)
+    model, motors, start_rates = excited(name, rng)
+    springs, rates = model.rest, start_rates
     for sign in (1.0, -1.0):
         rates = sign * rates
-        for _ in range(5):
-            springs, rates, _ = solver(name).step(springs, rates, motors, time_step=5e-4, damping_time=0.0, order=order)
+        for _ in range(4):
+            springs, rates, _ = solver(name).step(springs, rates, motors, time_step=1e-4, damping_time=0.0, order=order)
         if sign > 0.0:
-            assert np.abs(springs - start).max() > 1e-3
-    np.testing.assert_allclose(springs, start, rtol=0, atol=1e-11)
-    assert np.abs(rates).max() < 1e-7  # 1e-13 over the step, at each step
+            assert np.abs(springs - model.rest).max() > 5e-4
+    np.testing.assert_allclose(springs, model.rest, rtol=0, atol=1e-10)
+    assert np.abs(rates + start_rates).max() < 1e-6 * np.abs(start_rates).max()
 
 
-@pytest.mark.parametrize(("name", "order"), [("tendons", 2), ("winding lengths", 4)])
-def test_energy_is_kept(name: str, order: int, rng: np.random.Generator) -> None:
-    """Inputs stand still and do no work: the energy, by Pinocchio, keeps to the order of the steps."""
-    model, motors = robot(name), inputs(robot(name), rng)
+@pytest.mark.parametrize(("name", "step"), [("tendons", 1e-4), ("winding lengths", 8e-4)])
+def test_energy_is_kept(name: str, step: float, rng: np.random.Generator) -> None:
+    """Motors of tendons and lengths stand still and do no work: the energy, by Pinocchio, keeps to the order of the steps."""
+    model, motors, rates = excited(name, rng)
+    start = MotionState(model, 0.0, motors, np.zeros(model.n_motors), model.rest, 0.1 * rates)
     errors = []
-    for h in (4e-4, 2e-4):
-        energy = solver(name).simulate(8e-3, motors, damping_time=0.0, time_step=h, order=order).energy
+    for h in (step, 0.5 * step):
+        energy = solver(name).simulate(10.0 * step, motors, start=start, damping_time=0.0, time_step=h).energy
         errors.append(np.abs(energy.balance).max())
-        assert energy.kinetic.max() > 1e2 * errors[-1]
-    assert errors[1] < 0.4 * errors[0]
+        assert energy.kinetic.max() > 20.0 * errors[-1]
+    assert errors[1] < 0.3 * errors[0]
 
 
 def test_it_comes_to_rest_in_the_equilibrium() -> None:
-    """Overdamped by far, with slack tendons and long steps: the equilibrium of the general engine."""
+    """Overdamped, with slack tendons: the equilibrium of the general engine."""
     model = robot("tendons")
     motors = model.relaxed_motors + np.resize((-0.003, 0.004, 0.004), model.n_motors)
     rest = sr.solve_equilibrium(model, motors, gravity=GRAVITY)
-    motion = solver("tendons").simulate(20.0, motors, gravity=GRAVITY, damping_time=1.0, time_step=0.2)
+    motion = solver("tendons").simulate(1.0, motors, gravity=GRAVITY, damping_time=0.05, time_step=5e-3)
     assert (rest.muscle_forces == 0.0).any()
     np.testing.assert_allclose(motion.tip_position[-1], rest.tip_position, rtol=0, atol=1e-6)  # e^-20 of some centimetres
 
@@ -182,17 +193,7 @@ def test_a_step_beyond_the_range_of_a_route_fails() -> None:
     """A section that is bent until the tendon inside of its bend has no length."""
     model = robot("winding lengths")
     with pytest.raises(sr.NotConverged):
-        solver("winding lengths").step(model.rest, np.full(model.n_springs, 1e6), model.relaxed_motors, time_step=1e-3)
-
-
-def test_a_state_of_simulate_goes_on(rng: np.random.Generator) -> None:
-    """A start with velocities, and steps that are chosen."""
-    model, motors = robot("lengths"), inputs(robot("lengths"), rng)
-    still = np.zeros(model.n_motors)
-    start = MotionState(model, 0.0, motors, still, model.rest, 0.1 * rng.normal(size=model.n_springs))
-    found = solver("lengths").simulate(0.02, motors, start=start, damping_time=0.01, tolerance=1e-6)
-    expected = sr.simulate(model, 0.02, motors, start=start, damping_time=0.01, tolerance=1e-6)
-    assert np.abs(found.tip_position - expected.tip_position).max() < 2e-6
+        solver("winding lengths").step(model.rest, np.full(model.n_springs, 1e6), model.relaxed_motors)
 
 
 @pytest.mark.system
@@ -201,9 +202,11 @@ def test_a_state_of_simulate_goes_on(rng: np.random.Generator) -> None:
 def test_the_c_file_takes_the_same_steps(name: str, order: int, tmp_path: Path, rng: np.random.Generator) -> None:
     """Through ctypes."""
     model, motors, h = robot(name), inputs(robot(name), rng), 1e-3
-    expected = solver(name).simulate(10 * h, motors, gravity=GRAVITY, damping_time=0.01, time_step=h, output_step=h, order=order)
+    expected = solver(name).simulate(
+        10 * h, motors, gravity=GRAVITY, damping_time=0.01, time_step=h, output_step=h, order=order
+    )
     controller = Controller(solver(name), tmp_path, name="arm", motion=True, order=order)
-    numbers = {"GRAVITY": GRAVITY, "DAMPING": 0.01 * model.stiffness, "TIME_STEP": [h], "POSITION": model.rest}
+    numbers = {"GRAVITY": GRAVITY, "DAMPING": 0.01 * model.chain().stiffness, "TIME_STEP": [h], "POSITION": model.rest}
     numbers |= dict.fromkeys(("MOTORS_BEGIN", "MOTORS_MIDDLE", "MOTORS_END"), motors)
     for key, values in numbers.items():
         controller.put(key, values)

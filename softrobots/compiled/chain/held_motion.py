@@ -52,8 +52,6 @@ class HeldMotion(NamedTuple):
     """`W`, shape (n, c)."""
     slopes: FloatArray
     """`P`, shape (c, M)."""
-    damping: FloatArray
-    """Damping of the strains by that of the free coordinates, shape (n, f): of one time for all of the stiffness exactly."""
     linear: bool
     """Whether the lengths are linear in the strains that are not locked."""
 
@@ -62,11 +60,7 @@ def held_motion(unknowns: Unknowns) -> HeldMotion:
     """Return the matrices of a robot with given lengths."""
     chain, strains = unknowns.chain, list(unknowns.strains)
     moving = moving_coordinates(unknowns)
-    free, elastic, stiffness = (
-        chain.free[np.ix_(strains, moving)],
-        chain.elastic[np.ix_(moving, strains)],
-        chain.stiffness[strains],
-    )
+    free, elastic = chain.free[np.ix_(strains, moving)], chain.elastic[np.ix_(moving, strains)]
     shares, slopes = [], []
     for segment in unknowns.segments:
         muscles = sorted(segment.muscles)
@@ -76,17 +70,12 @@ def held_motion(unknowns: Unknowns) -> HeldMotion:
         rows[:, muscles] = right[:rank]
         shares.append(left[:, :rank] * values[:rank])
         slopes.append(rows)
-    own = stiffness[:, None] * free**2
-    of_free = own.sum(axis=0)
-    parts = own / of_free
-    damping = stiffness[:, None] * parts / (of_free * parts.sum(axis=1, keepdims=True).clip(1e-300))
     return HeldMotion(
         moving,
         _clean(free),
         _clean(elastic),
         _clean(np.concatenate(shares, axis=1)),
         _clean(np.concatenate(slopes)),
-        _clean(damping),
         _are_linear(chain.muscle_paths, strains),
     )
 

@@ -158,7 +158,8 @@ def _trace_kind(
     _store(back, places.sums, sums, places)
     kept = record.keep(back, vector(reduced)).tolist()
     steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6, places))
-    for stage, one in enumerate(corrections(steps) if layout.in_stages else (steps.tolist(),)):
+    shares = steps * (1.0 / plan.massive(step)) if len(steps) and layout.full_damping else steps
+    for stage, one in enumerate(corrections(shares) if layout.in_stages else (shares.tolist(),)):
         step.store_all(plan.correction + stage * n, one, "q")
     _store(step, places.answer, answer, places)
     _trace_place(place, places, group)
@@ -215,7 +216,7 @@ def _trace_factors(
     factor: Block, record: _Record, plan: MotionPlan, places: GroupLayout, group: MovingGroup, moving: _Moving
 ) -> ArticulatedGroup:
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
-    (_, quarter), pulls = plan.factors(factor), vector(factor.loads(places.pull, 12))
+    quarter, pulls = plan.factors(factor)[1] * (1.0 / plan.massive(factor)), vector(factor.loads(places.pull, 12))
     inertia, pull = symmetric(_loaded(factor, places.inertia, 21, places), 6), Pull(pulls[:3], pulls[3:].reshape(3, 3))
     found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, group.own, quarter)
     _store(factor, places.inertia, [inertia[index] for index in upper_triangle(6)], places)

@@ -59,7 +59,8 @@ class MovingGroup:
         """Axes of its end in those of its last element, shape (3, 3)."""
         self.reach = columns.entries([parts[group[-1]].reach for group in groups])
         """From its end to the beginning of the next group, or to the tip, in the axes of its end [m]."""
-        (half, quarter), place, routes = plan.factors(block), 0, plan.routes
+        half, quarter = (one * (1.0 / plan.massive(block)) for one in plan.factors(block))
+        place, routes = 0, plan.routes
         for rows in zip(*groups, strict=True):
             ones = [unknowns.traced(row) for row in rows]
             element = replace(table_element(ones, columns), rotation=columns.entries([parts[row].rotation for row in rows]))

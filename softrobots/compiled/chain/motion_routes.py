@@ -61,10 +61,10 @@ class MotionRoutes:
     """Their rates (n)."""
     strain_change: int = field(init=False)
     """Their accelerations (n)."""
-    strain_damping: int = field(init=False)
-    """Damping of each in the matrix of a step (n)."""
     correction: int = field(init=False)
     """Correction of their accelerations at all stages (k, n)."""
+    damper: int = field(init=False)
+    """Torque of one damper."""
     dampers: int = field(init=False)
     """Torque of the dampers on each free coordinate (as many)."""
     sums: int = field(init=False)
@@ -87,7 +87,7 @@ class MotionRoutes:
         n, c, k, muscles = len(self.unknowns.strains), self.rows, self.parts, len(self.unknowns.chain.actuators)
         sizes = dict(pulls=n, stiffness=c, arms=c * n, torques=k * n, sides=k * n)
         sizes |= dict(answers=k * c * n, system=k * c * c, multipliers=k * c, bound=1)
-        held = dict(strain=n, strain_rate=n, strain_change=n, strain_damping=n, correction=k * n, dampers=n, sums=c, gaps=c)
+        held = dict(strain=n, strain_rate=n, strain_change=n, correction=k * n, damper=1, dampers=n, sums=c, gaps=c)
         held |= dict(closing=c * c, slopes=muscles * n, swerves=muscles, swerving=muscles)
         sizes |= {name: size if self.held else 0 for name, size in held.items()}
         assign_places(self, self.routes.end, **sizes, end=0)

@@ -16,6 +16,7 @@ from softrobots.compiled.chain.unrolled_chain import place_base
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_actuators import actuator_parts
 from softrobots.compiled.program.motion_parts import MotionParts
+from softrobots.compiled.routes.motion_lengths import MASSIVE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import cosine, sine
 
@@ -80,10 +81,11 @@ def _control(plan: MotionPlan) -> str:
     if routes is not None:
         move = f"    {'move_lengths' if held else 'follow_actuators'}_SUFFIX(w)\n" + move
         resist += "    free_torques_SUFFIX(w)\n" if held else ""
-        articulate = ("    spread_damping_SUFFIX(w)\n" if held else "") + articulate + "    factor_border_SUFFIX(w)\n"
+        articulate += "    factor_border_SUFFIX(w)\n"
         solve = "    correct_strains_SUFFIX(w)\n" + ("    free_corrections_SUFFIX(w)\n" if held else "")
-    elif in_stages:
+    elif plan.reduces:
         solve = "    reduce_all_SUFFIX(w)\n" + solve
+    resist += MASSIVE if plan.layout.full_damping and not held else ""
     evaluate = ("    resist_stages_SUFFIX(w)\n", "") if in_stages else (move, resist)
     text = _CONTROL.replace("FACTOR", evaluate[0] + articulate + evaluate[1] + solve)
     text = text.replace("CORRECT", "".join(evaluate) + solve)
@@ -123,6 +125,7 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         _finish_place(plan, places),
         *([*placing_blocks(layout), keep_block(plan.torques[0], n)] if in_stages else []),
         *([] if actuators is None else [_start_reduce(places), *actuators.blocks]),
+        *([_add_mass(plan)] if layout.full_damping else []),
     ]
     tables |= {"N_STRAINS": n} | ({} if actuators is None else actuators.tables)
     loops, lane_loops = (
@@ -179,6 +182,17 @@ def _start_resist(plan: MotionPlan, places: GroupLayout) -> Block:
     block.store_all(places.wrench, [0.0, 0.0, 0.0, *_tip_force(plan, block)])
     block.store_all(places.sums, [0.0] * 6 * places.parts)
     block.store_all(places.answer, [0.0] * 6 * places.parts)
+    return block
+
+
+def _add_mass(plan: MotionPlan) -> Block:
+    block, layout, routes = (
+        Block("add_mass", "Add a part of Rayleigh's term for the mass.", ("i", "at", "j")),
+        plan.layout,
+        plan.routes,
+    )
+    to = plan.last_torques if routes is None or not routes.held else routes.dampers
+    block.store(to, block.load(to, "i") + block.load(layout.mass_damping, "at") * block.load(layout.rate, "j"), "i")
     return block
 
 

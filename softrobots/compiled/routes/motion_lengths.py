@@ -12,6 +12,12 @@ from softrobots.compiled.trace.expressions import absolute, smaller
 _CLOSED = 1e-12  # largest gap of the lengths [m], as in `softrobots.model.muscle_lengths`
 _CLOSINGS = 4  # of Newton's method, from the last strains; one is exact for lengths that are linear
 
+MASSIVE = """    for i in range(N):
+        for j in range(N):
+            add_mass_SUFFIX(w, i, N * i + j, j)
+"""
+"""Adds Rayleigh's term for the mass to the torques of the dampers."""
+
 LENGTHS = '''def combine_strains_SUFFIX(w: Array, to: int, coordinates: int, sums: int) -> None:
     """Combine free coordinates, held sums, or their rates, to strains."""
     for i in range(N_STRAINS):
@@ -85,14 +91,6 @@ def move_lengths_SUFFIX(w: Array) -> None:
     hold_lengths_SUFFIX(w, STRAIN_CHANGE, ACCELERATION, SWERVES)
 
 
-def spread_damping_SUFFIX(w: Array) -> None:
-    """Find the damping of the strains in the matrix of a step."""
-    for i in range(N_STRAINS):
-        clear_number_SUFFIX(w, STRAIN_DAMPING + i)
-        for k in range(DAMPED_FIRST[i], DAMPED_FIRST[i + 1]):
-            add_damped_SUFFIX(w, STRAIN_DAMPING + i, DAMPING + DAMPED_PLACE[k], k)
-
-
 def free_torques_SUFFIX(w: Array) -> None:
     """Take what holds the lengths from the torques out of balance that were written last, and add those of the dampers."""
     for m in range(N_BORDER):
@@ -112,7 +110,15 @@ def free_torques_SUFFIX(w: Array) -> None:
         for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
             take_product_SUFFIX(w, LAST_TORQUES + i, ARMS + N_STRAINS * m + i, GAPS + m)
     for i in range(N):
+        clear_number_SUFFIX(w, DAMPERS + i)
+    for i in range(N_STRAINS):
+        clear_number_SUFFIX(w, DAMPER)
+        for k in range(FREE_FIRST[i], FREE_FIRST[i + 1]):
+            add_free_SUFFIX(w, DAMPER, RATE + FREE_PLACE[k], k)
         find_damper_SUFFIX(w, i)
+        for k in range(FREE_FIRST[i], FREE_FIRST[i + 1]):
+            add_free_SUFFIX(w, DAMPERS + FREE_PLACE[k], DAMPER, k)
+MASSIVE    for i in range(N):
         for k in range(ELASTIC_FIRST[i], ELASTIC_FIRST[i + 1]):
             add_elastic_SUFFIX(w, LAST_TORQUES + ELASTIC_PLACE[k], DAMPERS + i, k)
 
@@ -132,14 +138,14 @@ def free_corrections_SUFFIX(w: Array) -> None:
 
 def length_tables(plan: MotionPlan, routes: MotionRoutes) -> dict[str, object]:
     """Return the tables and places of `LENGTHS`."""
-    given, layout, chain = routes.lengths, plan.layout, plan.unknowns.chain
+    given, chain = routes.lengths, plan.unknowns.chain
     tables = sparse("FREE", given.free) | sparse("SHARED", given.shares) | sparse("HELD", given.slopes)
-    tables |= sparse("ELASTIC", given.elastic) | sparse("DAMPED", given.damping)
+    tables |= sparse("ELASTIC", given.elastic)
     names = (
         "strain",
         "strain_rate",
         "strain_change",
-        "strain_damping",
+        "damper",
         "dampers",
         "sums",
         "gaps",
@@ -148,12 +154,11 @@ def length_tables(plan: MotionPlan, routes: MotionRoutes) -> dict[str, object]:
         "arms",
     )
     tables |= {name.upper(): getattr(routes, name) for name in names}
-    last = routes.torques + (len(plan.unknowns.strains) if layout.in_stages else 0)
     return tables | {
         "ROW_OF_MUSCLE": tuple(routes.stretched.index(one) for one in range(len(chain.actuators))),
         "LENGTH_REST": tuple(chain.muscle_paths.rest.tolist()),
         "LENGTH_SLOPES": routes.slopes,
-        "LAST_TORQUES": last,
+        "LAST_TORQUES": plan.last_torques,
         "STRAIN_CORRECTION": routes.correction,
         "N_CLOSINGS": 1 if given.linear else _CLOSINGS,
         "N_STAGES": routes.parts,
@@ -177,7 +182,7 @@ def held_blocks(plan: MotionPlan, routes: MotionRoutes) -> list[Block]:
     clear = Block("clear_number", "Clear a number.", ("at",))
     clear.store(0, 0.0, "at")
     adding = []
-    for name in ("free", "shared", "held", "elastic", "damped"):
+    for name in ("free", "shared", "held", "elastic"):
         add = Block(f"add_{name}", "Add a number times an entry of a matrix.", ("to", "source", "row"))
         add.store(0, add.load(0, "to") + add.load(0, "source") * add.table(name.upper(), 0, "row"), "to")
         adding.append(add)
@@ -197,7 +202,7 @@ def held_blocks(plan: MotionPlan, routes: MotionRoutes) -> list[Block]:
     steady = Block("steady", "Take the acceleration at constant rates from that of a given length.", ("m",))
     acceleration = steady.load(layout.motor_accelerations + chain.n_motors, "m")
     steady.store(routes.swerves, acceleration - steady.load(routes.swerves, "m"), "m")
-    damper = Block("find_damper", "Find the torque of the damper of a free coordinate.", ("i",))
-    damper.store(routes.dampers, damper.load(layout.damping, "i") * damper.load(layout.rate, "i"), "i")
+    damper = Block("find_damper", "Find the torque of a damper from the rate of its strain.", ("i",))
+    damper.store(routes.damper, damper.load(layout.damping, "i") * damper.load(routes.damper))
     closing = factor_blocks("closing", routes.closing, routes.gaps, routes.rows)
     return [clear, *adding, gap, close, judge, product, begin, steady, damper, *closing]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.chain.held_motion import moving_coordinates
-from softrobots.compiled.program.motion_program import check_motion, make_motion_program
+from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
@@ -20,7 +20,7 @@ from softrobots.compiled.run.results import CompiledMotion, MotionBatch, StepEnd
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
 from softrobots.core.errors import NotConverged
-from softrobots.dynamics.damping import damping_matrix
+from softrobots.dynamics.damping import damping_matrix, strain_damping
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.starting import first_kick, first_state
@@ -268,20 +268,28 @@ class CompiledDynamics(CompiledStatics):
 
     def _motion_code(self, gravity: Any, damping_time: Any, mass_damping: Any, order: int) -> tuple[Any, Any, FloatArray]:
         """Return the code, what stands in its workspace of gravity and damping, and the damping of the elastic coordinates."""
-        check_motion(self._unknowns)
         down = gravity_vector(gravity)
         alpha = non_negative_number("mass_damping", mass_damping, "1/s")
         beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
         if (beta, alpha) not in self._dampings:
             self._dampings[beta, alpha] = damping_matrix(self._model, beta, alpha)
         damping = self._dampings[beta, alpha]
-        own = damping[np.ix_(self._moving, self._moving)]
-        full = bool(np.any(own != np.diag(np.diag(own))))
+        moving, strains = np.ix_(self._moving, self._moving), list(self._unknowns.strains)
+        full = alpha > 0.0
         if (full, order) not in self._motion_runs:
             program = make_motion_program(self._unknowns, full_damping=full, order=order)
             self._motion_runs[full, order] = make_run(program, self._backend)
         run = self._motion_runs[full, order]
-        return run, [(run.layout.damping, own.ravel() if full else np.diag(own)), (run.layout.gravity, down)], damping
+        layout = run.layout
+        given = [(layout.gravity, down)]
+        if layout.strains is None and full:
+            given.append((layout.damping, damping[moving].ravel()))
+        else:
+            given.append((layout.damping, strain_damping(self._model, beta)[strains]))
+        if layout.strains is not None and full:
+            mass = damping_matrix(self._model, 0.0, alpha)[moving]
+            given += [(layout.mass_damping, mass.ravel()), (layout.mass_rate, np.array([alpha]))]
+        return run, given, damping
 
     def _first_state(self, course: Course, start: Any) -> tuple[FloatArray, FloatArray]:
         """Return unknowns and rates at time zero, each shape (n,), after the motors have begun to move."""
