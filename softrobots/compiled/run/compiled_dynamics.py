@@ -15,12 +15,12 @@ from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks
+from softrobots.compiled.run.motion_damping import MotionDamping
 from softrobots.compiled.run.motion_runs import StepsTaken, first_grid, halve_to_tolerance, replay, take_batch, take_one
 from softrobots.compiled.run.results import CompiledMotion, MotionBatch, StepEnd
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
 from softrobots.core.errors import NotConverged
-from softrobots.dynamics.damping import damping_matrix, strain_damping
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.starting import first_kick, first_state
@@ -42,8 +42,8 @@ class CompiledDynamics(CompiledStatics):
         """Generate and load the code; call `softrobots.compile` instead."""
         super().__init__(model, backend, locked_strains)
         self._motion_runs: dict[tuple[bool, int], Any] = {}
-        self._dampings: dict[tuple[float | None, float], FloatArray] = {}
         self._moving = list(moving_coordinates(self._unknowns))
+        self._damping = MotionDamping(model, self._unknowns.strains, self._moving)
 
     def simulate(
         self,
@@ -271,25 +271,13 @@ class CompiledDynamics(CompiledStatics):
         down = gravity_vector(gravity)
         alpha = non_negative_number("mass_damping", mass_damping, "1/s")
         beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
-        if (beta, alpha) not in self._dampings:
-            self._dampings[beta, alpha] = damping_matrix(self._model, beta, alpha)
-        damping = self._dampings[beta, alpha]
-        moving, strains = np.ix_(self._moving, self._moving), list(self._unknowns.strains)
         full = alpha > 0.0
         if (full, order) not in self._motion_runs:
             program = make_motion_program(self._unknowns, full_damping=full, order=order)
             self._motion_runs[full, order] = make_run(program, self._backend)
         run = self._motion_runs[full, order]
-        layout = run.layout
-        given = [(layout.gravity, down)]
-        if layout.strains is None and full:
-            given.append((layout.damping, damping[moving].ravel()))
-        else:
-            given.append((layout.damping, strain_damping(self._model, beta)[strains]))
-        if layout.strains is not None and full:
-            mass = damping_matrix(self._model, 0.0, alpha)[moving]
-            given += [(layout.mass_damping, mass.ravel()), (layout.mass_rate, np.array([alpha]))]
-        return run, given, damping
+        given = [*self._damping.inputs(run.layout, beta, alpha), (run.layout.gravity, down)]
+        return run, given, self._damping.matrix(beta, alpha)
 
     def _first_state(self, course: Course, start: Any) -> tuple[FloatArray, FloatArray]:
         """Return unknowns and rates at time zero, each shape (n,), after the motors have begun to move."""
