@@ -83,6 +83,19 @@ def test_a_released_robot_moves_as_simulate_says(name: str, order: int, rng: np.
     np.testing.assert_allclose(found.energy.elastic, expected.energy.elastic, rtol=1e-8, atol=1e-12)
 
 
+def test_tendons_go_slack_and_taut_again() -> None:
+    """Violent motion of tendons of which half hang loose: both engines take all steps whole, and agree."""
+    model, h, steps = robot("tendons"), 1e-3, 20
+    motors = model.relaxed_motors + 1e-3 * np.array((-3.0, 1.0, 0.0, -6.0, 4.0, 0.0))
+    given = {"gravity": GRAVITY, "damping_time": 0.005, "time_step": h, "output_step": h}
+    expected = sr.simulate(model, steps * h, motors, **given)
+    found = solver("tendons").simulate(steps * h, motors, **given)
+    slack = expected.motor_torques == 0.0
+    assert (slack.any(axis=0) & ~slack.all(axis=0)).any()
+    assert len(expected.steps) == steps + 1
+    close(found, expected, steps, h)
+
+
 @pytest.mark.parametrize("name", ["tendons", "lengths", "winding lengths"])
 def test_inputs_may_move(name: str, rng: np.random.Generator) -> None:
     """Motors of tendons, lengths and motor joints that swing, one robot by itself and two side by side."""

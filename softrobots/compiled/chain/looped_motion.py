@@ -218,7 +218,10 @@ def _trace_factors(
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
     quarter, pulls = plan.factors(factor)[1] * (1.0 / plan.massive(factor)), vector(factor.loads(places.pull, 12))
     inertia, pull = symmetric(_loaded(factor, places.inertia, 21, places), 6), Pull(pulls[:3], pulls[3:].reshape(3, 3))
-    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, group.own, quarter)
+    own = np.diag(vector(group.own)) if group.own else constants(np.zeros((0, 0)))
+    for (row, column), value in group.curvatures.items():
+        own[row, column] = own[column, row] = own[row, column] + value * quarter
+    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, own, quarter)
     _store(factor, places.inertia, [inertia[index] for index in upper_triangle(6)], places)
     factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
     one = found.eliminated

@@ -53,6 +53,8 @@ class MovingGroup:
         """Their accelerations."""
         self.own: list[Scalar] = []
         """`h/2 D + h^2/4 K` of each unknown."""
+        self.curvatures: dict[tuple[int, int], Scalar] = {}
+        """Tensions of routes times second derivatives of their lengths, by places of two unknowns."""
         self.torques: list[Scalar] = []
         """Torque of spring, damper and muscles on each unknown."""
         self.turn = constants(parts[groups[0][-1]].turn)
@@ -83,6 +85,10 @@ class MovingGroup:
                     torque = torque + damping * rates[axis]
                 if routes is not None and rows[0] in routes.routes.beside:
                     torque = torque + block.load(routes.pulls + place, "q")
+                    for other in range(number + 1) if not routes.held else ():
+                        pair = place - number + other, place
+                        at = routes.curvatures + len(unknowns.strains) * number + pair[0]
+                        self.curvatures[pair] = block.load(at, "q")
                 self.torques.append(torque)
                 place += 1
             segment = unknowns.segment_at(rows[0])

@@ -7,7 +7,8 @@ correction for torques `r` is
 .. math:: x = -A^{-1} r - X \lambda, \quad (1 + q K B X) \lambda = -q K B A^{-1} r
 
 and of given lengths :math:`B X \lambda = -B A^{-1} r`, which leaves `B x = 0` (Golub and Van Loan, Matrix Computations, 2013,
-section 2.1.4). `X` costs a pass over the chain for each row.
+section 2.1.4). `X` costs a pass over the chain for each row. The stiffness of the tensions is that of every evaluation, so that
+tendons may go slack between two of them.
 """
 
 from __future__ import annotations
@@ -39,6 +40,8 @@ class MotionRoutes:
     """Stages of a step, and parts of a number of the elimination: 2 where it is complex."""
     pulls: int = field(init=False)
     """Torque of the actuators on each strain (n) [N m or N]."""
+    curvatures: int = field(init=False)
+    """Tensions times second derivatives of the lengths by strains of an element, column by column (most of an element, n)."""
     stiffness: int = field(init=False)
     """Derivative of each tension by the length, of the rows of the border (c) [N/m]."""
     arms: int = field(init=False)
@@ -49,8 +52,10 @@ class MotionRoutes:
     """The same, or a row of the border, to be eliminated (k, n)."""
     answers: int = field(init=False)
     """`X`, row by row (c, n), or real and imaginary parts."""
+    products: int = field(init=False)
+    """`B X` (c, c), or real and imaginary parts."""
     system: int = field(init=False)
-    """The matrix of the multipliers and its factors (c, c), or real and imaginary parts."""
+    """The factors of the matrix of the multipliers (c, c), or real and imaginary parts."""
     multipliers: int = field(init=False)
     """The multipliers (c), or real and imaginary parts."""
     bound: int = field(init=False)
@@ -85,8 +90,10 @@ class MotionRoutes:
     def __post_init__(self) -> None:
         """Compute the places."""
         n, c, k, muscles = len(self.unknowns.strains), self.rows, self.parts, len(self.unknowns.chain.actuators)
-        sizes = dict(pulls=n, stiffness=c, arms=c * n, torques=k * n, sides=k * n)
-        sizes |= dict(answers=k * c * n, system=k * c * c, multipliers=k * c, bound=1)
+        sizes = dict(
+            pulls=n, curvatures=0 if self.held else n * self.routes.stride, stiffness=c, arms=c * n, torques=k * n, sides=k * n
+        )
+        sizes |= dict(answers=k * c * n, products=k * c * c, system=k * c * c, multipliers=k * c, bound=1)
         held = dict(strain=n, strain_rate=n, strain_change=n, correction=k * n, damper=1, dampers=n, sums=c, gaps=c)
         held |= dict(closing=c * c, slopes=muscles * n, swerves=muscles, swerving=muscles)
         sizes |= {name: size if self.held else 0 for name, size in held.items()}

@@ -90,6 +90,7 @@ TIME_STEP: int
 TIP: int
 VELOCITY: int
 WEIGHTS: int
+RENEW_SHARE: float
 WHOLE_STEP: int
 
 # Shape of the robot, see `softrobots.compiled.program.shape_program`.

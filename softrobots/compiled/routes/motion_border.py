@@ -38,7 +38,7 @@ def solve_{name}_SUFFIX(w: Array) -> None:
 
 
 BORDER = '''def factor_border_SUFFIX(w: Array) -> None:
-    """Solve for the rows of the border, and factor the matrix of the multipliers."""
+    """Solve for the rows of the border, and take their products with the answers."""
     for m in range(N_BORDER):
         for i in range(N_STRAINS):
             take_row_SUFFIX(w, i, N_STRAINS * m + i)
@@ -49,12 +49,9 @@ BORDER = '''def factor_border_SUFFIX(w: Array) -> None:
             keep_answer_SUFFIX(w, i, N_STRAINS * m + i)
     for m in range(N_BORDER):
         for n in range(N_BORDER):
-            clear_system_SUFFIX(w, N_BORDER * m + n)
+            clear_product_SUFFIX(w, N_BORDER * m + n)
             for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
-                add_system_SUFFIX(w, N_BORDER * m + n, N_STRAINS * m + i, N_STRAINS * n + i)
-            weigh_system_SUFFIX(w, N_BORDER * m + n, m)
-        unite_system_SUFFIX(w, (N_BORDER + 1) * m)
-    factor_system_SUFFIX(w)
+                add_product_SUFFIX(w, N_BORDER * m + n, N_STRAINS * m + i, N_STRAINS * n + i)
 
 
 def correct_strains_SUFFIX(w: Array) -> None:
@@ -69,6 +66,10 @@ def correct_strains_SUFFIX(w: Array) -> None:
         for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
             add_multiplier_SUFFIX(w, i, m, N_STRAINS * m + i)
         weigh_multiplier_SUFFIX(w, m)
+        for n in range(N_BORDER):
+            weigh_product_SUFFIX(w, N_BORDER * m + n, m)
+        unite_system_SUFFIX(w, (N_BORDER + 1) * m)
+    factor_system_SUFFIX(w)
     solve_system_SUFFIX(w)
     for m in range(N_BORDER):
         for i in range(N_STRAINS):
@@ -115,9 +116,14 @@ def factor_blocks(name: str, matrix: int, vector: int, rows: int, parts: int = 1
 def border_blocks(plan: MotionPlan, routes: MotionRoutes) -> list[Block]:
     """Trace the functions that `BORDER` calls."""
     n, c, parts, held = len(plan.unknowns.strains), routes.rows, routes.parts, routes.held
-    answers, system, multipliers = (
+    answers, products, system, multipliers = (
         _Numbers(first, stride, parts)
-        for first, stride in ((routes.answers, c * n), (routes.system, c * c), (routes.multipliers, c))
+        for first, stride in (
+            (routes.answers, c * n),
+            (routes.products, c * c),
+            (routes.system, c * c),
+            (routes.multipliers, c),
+        )
     )
 
     def correction(block: Block) -> Scalar:
@@ -134,24 +140,24 @@ def border_blocks(plan: MotionPlan, routes: MotionRoutes) -> list[Block]:
     keep = Block("keep_answer", "Keep the answer to a row of the border.", ("i", "row"))
     answers.store(keep, -correction(keep), "row")
     clear, clear_one = (
-        Block("clear_system", "Clear an entry.", ("at",)),
+        Block("clear_product", "Clear a product.", ("at",)),
         Block("clear_multiplier", "Clear a multiplier.", ("m",)),
     )
-    system.store(clear, 0.0 if parts == 1 else ComplexScalar(0.0, 0.0), "at")
+    products.store(clear, 0.0 if parts == 1 else ComplexScalar(0.0, 0.0), "at")
     multipliers.store(clear_one, 0.0 if parts == 1 else ComplexScalar(0.0, 0.0), "m")
-    add = Block("add_system", "Add the product of a row and an answer.", ("at", "row", "other"))
-    system.store(add, system.load(add, "at") + answers.load(add, "other") * add.load(routes.arms, "row"), "at")
+    add = Block("add_product", "Add the product of a row and an answer.", ("at", "row", "other"))
+    products.store(add, products.load(add, "at") + answers.load(add, "other") * add.load(routes.arms, "row"), "at")
     add_one = Block("add_multiplier", "Add the product of a row and the correction.", ("i", "m", "row"))
     multipliers.store(add_one, multipliers.load(add_one, "m") + correction(add_one) * add_one.load(routes.arms, "row"), "m")
-    weigh, weigh_one = (
-        Block(f"weigh_{name}", "Take the stiffness of an actuator times, where lengths are not given.", names)
-        for name, names in (("system", ("at", "m")), ("multiplier", ("m",)))
+    weigh = Block(
+        "weigh_product", "Take a product times the stiffness of an actuator, where lengths are not given.", ("at", "m")
     )
+    weigh_one = Block("weigh_multiplier", "Take a multiplier times that.", ("m",))
     unite = Block("unite_system", "Add one, where lengths are not given.", ("at",))
+    shares = [1.0 if held else plan.factors(one)[1] * one.load(routes.stiffness, "m") for one in (weigh, weigh_one)]
+    system.store(weigh, products.load(weigh, "at") * shares[0], "at")
+    multipliers.store(weigh_one, multipliers.load(weigh_one, "m") * shares[1], "m")
     if not held:
-        for block, numbers, base in ((weigh, system, "at"), (weigh_one, multipliers, "m")):
-            share = plan.factors(block)[1] * block.load(routes.stiffness, "m")
-            numbers.store(block, share * numbers.load(block, base), base)
         system.store(unite, system.load(unite, "at") + 1.0, "at")
     take = Block("take_answer", "Take an answer times its multiplier from the correction.", ("i", "m", "row"))
     corrected = correction(take) - answers.load(take, "row") * multipliers.load(take, "m")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from softrobots.compiled.chain.elements import upper_triangle
 from softrobots.compiled.chain.motion_groups import OUT_OF_RANGE
 from softrobots.compiled.chain.motion_routes import MotionRoutes
 from softrobots.compiled.chain.unknowns import Segment
@@ -65,6 +66,8 @@ def form_blocks(routes: MotionRoutes, name: str, form: Form) -> list[Block]:
     keep.store_all(routes.slopes if routes.held else routes.arms, keep.loads(0, k, "at"), "to")
     give = Block(f"give_pulls_{name}", "Keep the torques of the actuators on an element.", ("q",))
     give.store_all(routes.pulls, give.loads(own.load, k), "q")
+    for number, (i, j) in enumerate(upper_triangle(k)) if not routes.held else ():
+        give.store(routes.curvatures + len(routes.unknowns.strains) * j + i, give.load(own.curvature + number), "q")
     return [keep, give]
 
 
