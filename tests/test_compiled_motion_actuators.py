@@ -230,14 +230,12 @@ def test_the_c_file_takes_the_same_steps(name: str, order: int, tmp_path: Path, 
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("arm", [sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1), sr.PccArm(segment_lengths=(0.4,))])
-def test_numba_takes_the_same_steps(arm: Any, rng: np.random.Generator) -> None:
-    """Single and in lanes, of tendons and of given lengths."""
-    model = sr.load_model(arm)
+@pytest.mark.timeout(900)  # machine code of many functions, for one case and for lanes
+def test_numba_takes_the_same_steps(rng: np.random.Generator) -> None:
+    """In lanes; a lane that fails there would be done alone."""
+    model = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1))
     motors = np.array([inputs(model, rng) for _ in range(2)])
     given = {"gravity": GRAVITY, "damping_time": 0.01, "time_step": 1e-3, "output_step": 1e-3}
     expected = sr.compile(model, backend="python").simulate(0.01, motors[1], **given)
-    fast = sr.compile(model, backend="numba")
-    found, many = fast.simulate(0.01, motors[1], **given), fast.simulations(0.01, motors, **given)
-    np.testing.assert_allclose(found.tip_position, expected.tip_position, rtol=0, atol=1e-11)
-    np.testing.assert_allclose(many.tip_position[1], expected.tip_position, rtol=0, atol=1e-11)
+    found = sr.compile(model, backend="numba").simulations(0.01, motors, **given)
+    np.testing.assert_allclose(found.tip_position[1], expected.tip_position, rtol=0, atol=1e-11)
