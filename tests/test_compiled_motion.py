@@ -348,13 +348,6 @@ def test_refused(row: int, solver: CompiledModel) -> None:
         call(solver)
 
 
-def test_given_muscle_lengths_are_refused_by_name() -> None:
-    solver = sr.compile(ROBOTS["pcc"](), backend="python")
-    for call in (lambda: solver.simulate(0.1, solver.model.relaxed_motors), lambda: solver.c_source(motion=True)):
-        with pytest.raises(ParameterError, match="given muscle lengths"):
-            call()
-
-
 @pytest.mark.system
 def test_the_c_file_takes_the_same_steps(solver: CompiledModel, arm: SoftModel, tmp_path: Path) -> None:
     """Through ctypes, as a controller calls it."""

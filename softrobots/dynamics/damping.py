@@ -59,8 +59,11 @@ def damping_matrix(
     """
     check_model(model)
     alpha = non_negative_number("mass_damping", mass_damping, "1/s")
-    if damping_time is None:
-        damping = _of_the_file(model)
+    lengths = model.structure.muscle_lengths
+    if damping_time is None and lengths is not None:
+        damping = np.asarray(lengths.free.T @ (strain_damping(model)[:, None] * lengths.free))
+    elif damping_time is None:
+        damping = np.diag(strain_damping(model))
     else:
         damping = np.diag(non_negative_number("damping_time", damping_time, "s") * model.stiffness)
     if alpha == 0.0:
@@ -117,15 +120,13 @@ def measured_decay(time: Any, signal: Any) -> Decay:
     return Decay(2.0 * math.pi * ratio / slow, float(found.frequencies[0]) * slow)
 
 
-def _of_the_file(model: SoftModel) -> FloatArray:
-    """The damping of the joints of the file, in elastic coordinates."""
+def strain_damping(model: SoftModel, damping_time: float | None = None) -> FloatArray:
+    """Damping of the strains, before muscle lengths constrain them, shape (n_strains,): by a time [s], or that of the file."""
+    if damping_time is not None:
+        return np.asarray(damping_time * model.structure.strain_springs.stiffness)
     structure, joints = model.structure, np.array(model.pinocchio.damping)
     strains = [joints[structure.spring_indices]]
     for row in structure.section_table if structure.constant_strain else ():
         of_section = joints[velocity_indices(model.pinocchio, row.joint_names)]
         strains.append(of_section[np.array(_SHARING)].mean(axis=1))
-    damping = np.concatenate(strains)
-    if structure.muscle_lengths is None:
-        return np.diag(damping)
-    free = structure.muscle_lengths.free
-    return np.asarray(free.T @ (damping[:, None] * free))
+    return np.concatenate(strains)

@@ -67,6 +67,8 @@ class EquationsOfMotion:
         self._laws = model.structure.actuator_laws
         kinds = () if self._laws is None else self._laws.kinds
         self._springy = np.array([kind == "elastic" for kind in kinds], dtype=bool)
+        self.has_slack_tendons = "elastic" in kinds or "mckibben" in kinds
+        """Whether tensions depend on the lengths and may be slack."""
         self._pushing = model.actuators.n_placed + np.flatnonzero(~self._springy)
         self._applied: tuple[Any, AppliedLoad] | None = None
         self._last: tuple[bytes, Point] | None = None

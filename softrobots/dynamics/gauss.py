@@ -26,7 +26,7 @@ import math
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.dynamics.midpoint import CHANGE, ITERATIONS, RENEWED, ROUNDED, MidpointRule, Stage, State, Step
+from softrobots.dynamics.midpoint import CHANGE, ITERATIONS, RENEWED, ROUNDED, SLOW, MidpointRule, Stage, State, Step
 
 _ROOT = math.sqrt(3.0)
 
@@ -57,14 +57,14 @@ class GaussRule(MidpointRule):
         h, wrenches, shares = end_time - start.time, self.load(start.time), np.array(STAGES)
         y0, v0, weights, squares = start.x[m:], start.rates[m:], np.array(WEIGHTS), np.array(SQUARES)
         coasting, size = y0 + h * np.multiply.outer(shares, v0), max(1.0, math.sqrt(y0.dot(y0)))
-        a, last, factors = self._guess(h, coasting), np.inf, None
+        a, last, factors, shrinking = self._guess(h, coasting), np.inf, None, 0.0
         for iteration in range(1, ITERATIONS + 1):
             y, v = coasting + h * h * (squares @ a), v0 + h * (weights @ a)
             stages = tuple(self._stage(start, h * share, *place) for share, *place in zip(STAGES, y, v, a, strict=True))
             residual = np.array([stage.forces[m:] for stage in stages])
             if not math.isfinite(float(np.vdot(residual, residual))):
                 return None
-            if factors is None or iteration == RENEWED:
+            if factors is None or iteration == RENEWED or (self._has_knees and shrinking > SLOW):
                 x, scale = stages[1].state.x, h * EIGENVALUE
                 slopes = scale * equations.damping + scale * scale * equations.stiffness(x, wrenches)
                 factors = lu_factor((equations.mass_matrix(x) + slopes)[m:, m:], check_finite=False)
@@ -76,7 +76,7 @@ class GaussRule(MidpointRule):
                 break
             if not moved < 1e3 * last:
                 return None
-            last = moved
+            shrinking, last = moved / last, moved
         else:
             return None
         self._earlier[:] = [(h, coasting + h * h * (squares @ a)), *self._earlier[:2]]

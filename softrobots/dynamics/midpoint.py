@@ -35,7 +35,8 @@ ITERATIONS = 30
 """Most iterations of a step."""
 RENEWED = 8
 """Iteration after which the matrix is computed again."""
-_SLOW = 0.1  # share of the last change, above which the matrix is computed again for motors that move by their torque
+SLOW = 0.1
+"""Share of the last change, above which the matrix is computed again where forces have knees: of motors, of slack tendons."""
 
 Wrenches = Mapping[str, FloatArray]
 """Dead wrench by frame, shape (6,) [N, N m], world axes."""
@@ -127,6 +128,7 @@ class MidpointRule:
         self._block: Any = np.ix_(self.free, self.free) if torque else (self._at, self._at)
         self._damping = equations.damping[self._block]
         self._known: tuple[float, FloatArray] | None = None
+        self._has_knees = torque is not None or equations.has_slack_tendons
         self.forget()
 
     def kicked(self, state: State, change: FloatArray) -> State:
@@ -173,7 +175,7 @@ class MidpointRule:
                 residual[: torque.count] -= torque.exerted(middle_time, x, rates)
             if not math.isfinite(residual.dot(residual)):
                 return None
-            if solve is None or iteration == RENEWED or (torque is not None and shrinking > _SLOW):
+            if solve is None or iteration == RENEWED or (self._has_knees and shrinking > SLOW):
                 solve = self._factorised(middle_time, x, rates, wrenches, h)
             change = solve(residual)
             if torque is not None and torque.has_friction:

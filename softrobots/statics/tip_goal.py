@@ -154,16 +154,9 @@ class LoadedTip:
         state = balanced_state(self.model, q_motors, self.load, start, method=self.method)
         if state is None:
             return None
-        excess, actuators = 0.0, self.model.actuators
-        if actuators.least_tension:
-            structure = self.model.structure
-            elongations = structure.muscle_paths.at(structure.strains(q_motors, state.q_springs)).elongation
-            taut = actuators.taken_up(q_motors, elongations)
-            if not np.array_equal(taut, q_motors):
-                return self.solve(taut, state.q_springs)
-            low, high = actuators.sought_tensions.T
-            tensions = state.load.motors[len(q_motors) - len(low) :]
-            excess = max(0.0, float(np.max([low - tensions, tensions - high])) / actuators.tension_scale)
+        taut, excess = taken_up(self.model, q_motors, state)
+        if not np.array_equal(taut, q_motors):
+            return self.solve(taut, state.q_springs)
         if self.model.structure.friction is not None:  # where it sticks, the tip would not move at all
             state = elastic_state(slipping(self.model), q_motors, state.q_springs, self.load)
         translation, turn = self.goal.missing(self.model, state.q)
@@ -196,6 +189,24 @@ class LoadedTip:
         given = [row for row, muscle in enumerate(self.model.muscles) if muscle.kind == "tension"]
         slope[given, np.array(given, dtype=int) - count] = 1.0
         return pull(self.model, state.load.motors[-count:], slope)
+
+
+def taken_up(model: SoftModel, q_motors: FloatArray, state: ElasticState) -> tuple[FloatArray, float]:
+    """Return actuators with the slack of tendons taken up, and the largest tension beyond its limits; 0 of muscles that push.
+
+    Args:
+        model: The robot.
+        q_motors: Its actuators, shape (n_motors,).
+        state: The robot in equilibrium there.
+    """
+    actuators, structure = model.actuators, model.structure
+    if not actuators.least_tension:
+        return q_motors, 0.0
+    elongations = structure.muscle_paths.at(structure.strains(q_motors, state.q_springs)).elongation
+    low, high = actuators.sought_tensions.T
+    tensions = state.load.motors[len(q_motors) - len(low) :]
+    excess = max(0.0, float(np.max([low - tensions, tensions - high])) / actuators.tension_scale)
+    return actuators.taken_up(q_motors, elongations), excess
 
 
 def checked_orientation(value: Any) -> FloatArray | None:

@@ -111,7 +111,7 @@ class Pull:
 
 
 def articulate(
-    inertia: Any, pull: Pull, joints: list[JointLine], reach: Vector, slopes: Any, own: list[Scalar], quarter: Scalar
+    inertia: Any, pull: Pull, joints: list[JointLine], reach: Vector, slopes: Any, own: Any, quarter: Scalar
 ) -> tuple[ArticulatedGroup, Any, Pull]:
     """Eliminate the coordinates of a group of joints.
 
@@ -121,7 +121,7 @@ def articulate(
         joints: The joints, base to tip.
         reach: From the end of the last joint to there [m].
         slopes: Derivatives of the joint positions by the coordinates, shape (n, k).
-        own: `h/2 D + h^2/4 K` of each coordinate (k).
+        own: `h/2 D + h^2/4 K` of the coordinates themselves, with that of tensions along the group, shape (k, k).
         quarter: `h^2/4` [s^2].
 
     Returns:
@@ -135,7 +135,7 @@ def articulate(
         joint = joints[number]
         inertia = with_body(inertia, joint.body, joint.axes)
         pull = pull.with_force(joint.force, joint.axes @ joint.body.centre)
-        if own:
+        if len(own):
             push = (inertia[:, :3] if joint.shift is None else inertia[:, 3:]) @ joint.axis
             turned = pull.bend(joint) * quarter
             pushes.insert(0, np.concatenate([push[:3] + turned, push[3:]]))
@@ -147,12 +147,10 @@ def articulate(
         if joint.shift is not None:
             inertia, pull, shift = moved_inertia(inertia, joint.shift), pull.moved(joint.shift), shift + joint.shift
             pushes = [moved_wrench(push, joint.shift) for push in pushes]
-    if not own:
+    if not len(own):
         rigid = Eliminated(constants(np.eye(0)), [], constants(np.zeros((0, 6))), [])
         return ArticulatedGroup(rigid, constants(np.zeros((6, 0))), shift, reach), inertia, pull
-    block = slopes.T @ (products @ slopes)
-    for place, value in enumerate(own):
-        block[place, place] = block[place, place] + value
+    block = slopes.T @ (products @ slopes) + own
     bends = -(np.stack(pushes, axis=1) @ slopes)
     none = constants(np.zeros(bends.shape))
     eliminated, rest = eliminate(Outboard(-inertia, [], 1.0, 0.0), none, bends, block, [], [1.0] * len(own))

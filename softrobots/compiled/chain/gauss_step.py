@@ -52,8 +52,14 @@ def placing_blocks(layout: MotionLayout) -> list[Block]:
         places = layout.unknown, layout.rate, layout.acceleration
         for place, value in zip(places, stage_values(layout, block, stage, base="i"), strict=True):
             block.store(place, value, "i")
-    blocks[1].store(layout.forces, blocks[1].load(layout.forces + layout.unknowns, "i"), "i")  # of the first stage
     return blocks
+
+
+def keep_block(place: int, count: int) -> Block:
+    """Return the function that keeps the torque on a strain at the first stage, before those of the second are written."""
+    block = Block("keep_first_stage", "Keep the torque on a strain at the first stage.", ("i",))
+    block.store(place, block.load(place + count, "i"), "i")
+    return block
 
 
 def _guess(layout: MotionLayout, block: Block) -> Block:

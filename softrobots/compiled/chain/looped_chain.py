@@ -56,7 +56,7 @@ def element_signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     """Return the properties that elements with the same code share."""
     one = unknowns.traced(row)
     zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
-    routed = unknowns.chain.routed and unknowns.segment_at(row) is not None
+    routed = unknowns.routed and unknowns.segment_at(row) is not None
     constraint = -1 if routed else unknowns.multipliers_at(row)
     muscles = [(muscle.number, muscle.twists, [arm == 0.0 for arm in muscle.arms]) for muscle in one.muscles]
     return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0)), str(muscles)

@@ -146,20 +146,21 @@ def _trace_kind(
         total = total if joint.shift is None else moved_wrench(total, joint.shift)
     back.store_all(places.wrench, total.tolist())
     gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
-    blocks, layout = [out, factor, back, step, place], plan.layout
-    if layout.in_stages:
-        back.store_all(layout.forces + layout.unknowns, gradient, "q")
-        back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at both stages.", names, out.trace)
+    blocks, layout, n = [out, factor, back, step, place], plan.layout, places.unknowns
+    if plan.reduces:
+        written, read = plan.torques
+        back.store_all(written + (n if layout.in_stages else 0), gradient, "q")
+        back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
         blocks.append(back)
-        both = (back.loads(layout.forces + stage * layout.unknowns, len(gradient), "q") for stage in range(2))
-        gradient = right_hand_side(*both)
+        stages = [back.loads(read + stage * n, len(gradient), "q") for stage in range(places.parts)]
+        gradient = right_hand_side(*stages) if layout.in_stages else [*stages[0]]
     reduced, sums = carried_inward(factors, gradient, _loaded(back, places.sums, 6, places))
     _store(back, places.sums, sums, places)
     kept = record.keep(back, vector(reduced)).tolist()
     steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6, places))
-    stages = corrections(steps) if layout.in_stages else (steps.tolist(),)
-    for stage, one in enumerate(stages):
-        step.store_all(layout.correction + stage * layout.unknowns, one, "q")
+    shares = steps * (1.0 / plan.massive(step)) if len(steps) and layout.full_damping else steps
+    for stage, one in enumerate(corrections(shares) if layout.in_stages else (shares.tolist(),)):
+        step.store_all(plan.correction + stage * n, one, "q")
     _store(step, places.answer, answer, places)
     _trace_place(place, places, group)
     return Kind(number, [group[0] for group in groups], blocks, columns, record.size)
@@ -215,9 +216,12 @@ def _trace_factors(
     factor: Block, record: _Record, plan: MotionPlan, places: GroupLayout, group: MovingGroup, moving: _Moving
 ) -> ArticulatedGroup:
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
-    (_, quarter), pulls = plan.factors(factor), vector(factor.loads(places.pull, 12))
+    quarter, pulls = plan.factors(factor)[1] * (1.0 / plan.massive(factor)), vector(factor.loads(places.pull, 12))
     inertia, pull = symmetric(_loaded(factor, places.inertia, 21, places), 6), Pull(pulls[:3], pulls[3:].reshape(3, 3))
-    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, group.own, quarter)
+    own = np.diag(vector(group.own)) if group.own else constants(np.zeros((0, 0)))
+    for (row, column), value in group.curvatures.items():
+        own[row, column] = own[column, row] = own[row, column] + value * quarter
+    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, own, quarter)
     _store(factor, places.inertia, [inertia[index] for index in upper_triangle(6)], places)
     factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
     one = found.eliminated

@@ -21,7 +21,9 @@ from softrobots.compiled.trace.expressions import Scalar, if_less
 from softrobots.core.checks import FloatArray
 from softrobots.model.serial_chain import ChainBody, ChainJoint, bodies_of
 
-_OUT_OF_RANGE = 1e200  # torque on a section beyond its range: a step that ends there does not converge
+OUT_OF_RANGE = 1e200
+"""Torque on a section beyond its range: a step that ends there does not converge."""
+
 _MOST_JOINTS = 4  # of a group: its cost grows with their square
 
 
@@ -51,13 +53,16 @@ class MovingGroup:
         """Their accelerations."""
         self.own: list[Scalar] = []
         """`h/2 D + h^2/4 K` of each unknown."""
+        self.curvatures: dict[tuple[int, int], Scalar] = {}
+        """Tensions of routes times second derivatives of their lengths, by places of two unknowns."""
         self.torques: list[Scalar] = []
         """Torque of spring, damper and muscles on each unknown."""
         self.turn = constants(parts[groups[0][-1]].turn)
         """Axes of its end in those of its last element, shape (3, 3)."""
         self.reach = columns.entries([parts[group[-1]].reach for group in groups])
         """From its end to the beginning of the next group, or to the tip, in the axes of its end [m]."""
-        (half, quarter), place = plan.factors(block), 0
+        half, quarter = (one * (1.0 / plan.massive(block)) for one in plan.factors(block))
+        place, routes = 0, plan.routes
         for rows in zip(*groups, strict=True):
             ones = [unknowns.traced(row) for row in rows]
             element = replace(table_element(ones, columns), rotation=columns.entries([parts[row].rotation for row in rows]))
@@ -71,15 +76,23 @@ class MovingGroup:
                 )
             for number, axis in enumerate(element.moving):
                 coordinates[axis], rates[axis], changes[axis], damping = (
-                    block.load(first + place, "q")
-                    for first in (layout.unknown, layout.rate, layout.acceleration, layout.damping)
+                    block.load(first + place, "q") for first in plan.strains
                 )
-                place += 1
                 stiffness = element.stiffness[number]
                 self.own.append(half * damping + quarter * stiffness)
-                self.torques.append((coordinates[axis] - rest[number]) * stiffness + damping * rates[axis])
+                torque = (coordinates[axis] - rest[number]) * stiffness
+                if routes is None or not routes.held:  # else dampers act on the free coordinates
+                    torque = torque + damping * rates[axis]
+                if routes is not None and rows[0] in routes.routes.beside:
+                    torque = torque + block.load(routes.pulls + place, "q")
+                    for other in range(number + 1) if not routes.held else ():
+                        pair = place - number + other, place
+                        at = routes.curvatures + len(unknowns.strains) * number + pair[0]
+                        self.curvatures[pair] = block.load(at, "q")
+                self.torques.append(torque)
+                place += 1
             segment = unknowns.segment_at(rows[0])
-            if segment is not None:
+            if segment is not None and routes is None:
                 tensions = [block.load(unknowns.chain.n_motors + muscle) for muscle in segment.muscles]
                 pulls = pulls_on(element.muscles, coordinates, tensions, [], 0)
                 for number, axis in enumerate(element.moving):
@@ -97,7 +110,7 @@ class MovingGroup:
         first = self.elements[0]
         if first.kind == "section":
             section = SectionState(first.coordinates, self.rates[0], self.changes[0], first.length)
-            beyond = if_less(0.0, range_margin(first, section.screw), 0.0, _OUT_OF_RANGE)
+            beyond = if_less(0.0, range_margin(first, section.screw), 0.0, OUT_OF_RANGE)
             self.torques[0] = self.torques[0] + beyond
             return section.joints, section.slopes[:, list(first.moving)]
         joints = []
@@ -200,8 +213,9 @@ def group_signature(unknowns: Unknowns, row: int, parts: ElementParts) -> tuple[
     """Return the properties that elements with the same code share."""
     rounds = [part and part[0] for part in (round_part(body.inertia) for body in parts.bodies)]
     segment, (kind, moving, *_, muscles) = unknowns.segment_at(row), element_signature(unknowns, row)
+    pulled = segment and (unknowns.routed or segment.muscles)
     zeros = [(array == 0.0).tolist() for array in (parts.rotation, parts.reach)]
-    return kind, moving, muscles, str(rounds), segment and segment.muscles, str(zeros), str(parts.turn.tolist())
+    return kind, moving, muscles, str(rounds), pulled, str(zeros), str(parts.turn.tolist())
 
 
 def reach_behind(unknowns: Unknowns, row: int) -> FloatArray:

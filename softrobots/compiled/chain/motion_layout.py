@@ -5,7 +5,9 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
+from softrobots.compiled.chain.held_motion import moving_coordinates
 from softrobots.compiled.chain.layout import assign_places
+from softrobots.compiled.chain.motion_routes import MotionRoutes
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.motion_settings import KEPT_DIFFERENCES
 from softrobots.compiled.trace.blocks import Block
@@ -13,26 +15,29 @@ from softrobots.compiled.trace.complex_numbers import ComplexScalar
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.dynamics.gauss import EIGENVALUE, GaussRule
 
-_COUNTS = ("unknowns", "full_damping", "order", "prepared")  # no places for callers
-_OF_STAGES = ("stages", "forces")  # places only of a method with two stages
+_COUNTS = ("unknowns", "full_damping", "order", "strains", "prepared")  # no places for callers
+_INNER = ("stages", "forces", "mass_damping", "mass_rate")  # places that some robots do not have
 
 
 @dataclass(frozen=True)
 class MotionLayout:
     """Places in the workspace of a step of time, in this order.
 
-    `n` unknowns, `m` actuators. Straight-line functions read motors, force, gravity, damping, time step, `unknown`, `rate`
-    and `acceleration`, and write `correction` and `tip`; all else is for the drivers.
+    `n` unknowns, the strains or with given lengths the free coordinates, and `m` actuators. Straight-line functions read
+    motors, force, gravity, damping, time step, `unknown`, `rate` and `acceleration`, and write `correction` and `tip`; all else
+    is for the drivers.
     """
 
     motors: int
     """Number of actuators, motor joints and then muscles; their coordinates in the middle of the step come first (m)."""
     unknowns: int
-    """Number of unknown strains."""
+    """Number of unknowns."""
     full_damping: bool = False
     """Whether the damping is a matrix rather than a number for each unknown."""
     order: int = 2
     """Order of the steps: 2 by the midpoint rule, 4 by the method of Gauss with two stages."""
+    strains: int | None = None
+    """Number of strains of a looped chain, each with a damper; None for unrolled ones."""
     motor_velocities: int = field(init=False)
     """Their velocities there (m) [rad/s or m/s]."""
     motor_accelerations: int = field(init=False)
@@ -42,7 +47,11 @@ class MotionLayout:
     gravity: int = field(init=False)
     """Gravity, world axes [m/s^2] (3)."""
     damping: int = field(init=False)
-    """Damping of each unknown (n) [N m s/rad or N s/m], or the matrix, row by row (n, n)."""
+    """Damping of each unknown (n) [N m s/rad or N s/m], or the matrix, row by row (n, n); of looped chains of each strain."""
+    mass_damping: int = field(init=False)
+    """The part of the damping of a looped chain that is a matrix, row by row (n, n): Rayleigh's factor times the mass."""
+    mass_rate: int = field(init=False)
+    """That factor [1/s]."""
     time_step: int = field(init=False)
     """Length of the step [s]."""
     unknown: int = field(init=False)
@@ -108,8 +117,11 @@ class MotionLayout:
     def __post_init__(self) -> None:
         """Compute the places."""
         m, n, k = self.motors, self.unknowns, 2 if self.in_stages else 1
-        damping = n * n if self.full_damping else n
-        given = dict(motor_velocities=m, motor_accelerations=m, force=3, gravity=3, damping=damping)
+        full = n * n if self.full_damping else 0
+        damping = dict(damping=full or n, mass_damping=0, mass_rate=0)
+        if self.strains is not None:
+            damping = dict(damping=self.strains, mass_damping=full, mass_rate=1 if full else 0)
+        given = dict(motor_velocities=m, motor_accelerations=m, force=3, gravity=3) | damping
         middle = dict(time_step=1, unknown=n, rate=n, acceleration=n, correction=k * n, tip=3)
         state = dict(position=n, velocity=n, begin_position=n, begin_velocity=n)
         before = dict(
@@ -117,13 +129,15 @@ class MotionLayout:
         )
         path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1)
         search = dict(scale=n, change=1, last_change=1, settled=1, failed=1)
-        stages = dict.fromkeys(_OF_STAGES, (k - 1) * 2 * n)
+        stages = dict(stages=(k - 1) * 2 * n, forces=k * (self.strains or 0) if k == 2 or full else 0)
         assign_places(self, m, **given, **middle, **state, **before, **path, **search, **stages, prepared=0)
 
     def constants(self) -> dict[str, int]:
         """Return the places by their names in generated code."""
-        left_out = _COUNTS if self.in_stages else _COUNTS + _OF_STAGES
+        left_out = _COUNTS + _INNER
         places = {name.upper(): place for name, place in vars(self).items() if name not in left_out}
+        if self.strains is not None and self.full_damping:
+            places |= {"MASS_DAMPING": self.mass_damping, "MASS_RATE": self.mass_rate}
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
 
 
@@ -141,7 +155,50 @@ class MotionPlan:
     @cached_property
     def layout(self) -> MotionLayout:
         """Places of the numbers of a case."""
-        return MotionLayout(len(self.unknowns.chain.limits), len(self.unknowns.strains), self.full_damping, self.order)
+        unknowns = self.unknowns
+        count, strains = len(moving_coordinates(unknowns)), None if unknowns.is_unrolled else len(unknowns.strains)
+        return MotionLayout(len(unknowns.chain.limits), count, self.full_damping, self.order, strains)
+
+    @cached_property
+    def routes(self) -> MotionRoutes | None:
+        """Places of actuators on routes and of the strains that they hold; None without any."""
+        layout = self.layout
+        return MotionRoutes(self.unknowns, layout.prepared, 2 if layout.in_stages else 1) if self.unknowns.routed else None
+
+    @property
+    def strains(self) -> tuple[int, int, int, int]:
+        """Place of the unknown strains, their rates, accelerations and dampers."""
+        layout, routes = self.layout, self.routes
+        if routes is None or not routes.held:
+            return layout.unknown, layout.rate, layout.acceleration, layout.damping
+        return routes.strain, routes.strain_rate, routes.strain_change, layout.damping
+
+    @property
+    def correction(self) -> int:
+        """Place of the correction of the accelerations of the strains."""
+        return self.layout.correction if self.routes is None or not self.routes.held else self.routes.correction
+
+    @property
+    def reduces(self) -> bool:
+        """Whether torques out of balance are written first, and eliminated in a pass of their own."""
+        return self.layout.in_stages or self.routes is not None or self.layout.full_damping
+
+    @property
+    def torques(self) -> tuple[int, int]:
+        """Where torques out of balance are written, and where they are read to be eliminated, at all stages."""
+        return (self.layout.forces, self.layout.forces) if self.routes is None else (self.routes.torques, self.routes.sides)
+
+    @property
+    def last_torques(self) -> int:
+        """Where the torques out of balance of the stage that is evaluated are written."""
+        return self.torques[0] + ((self.layout.strains or 0) if self.layout.in_stages else 0)
+
+    def massive(self, block: Block) -> Scalar:
+        """Return the factor of the mass in the matrix of a step: one and that of a damper times Rayleigh's factor."""
+        layout = self.layout
+        if layout.strains is None or not layout.full_damping:
+            return 1.0
+        return self.factors(block)[0] * block.load(layout.mass_rate) + 1.0
 
     def factors(self, block: Block) -> tuple[Scalar, Scalar]:
         """Return the factors of damping and stiffness in the matrix of a step: `h/2` and `h^2/4`, or complex ones."""

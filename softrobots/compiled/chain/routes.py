@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 from itertools import accumulate
-from typing import NamedTuple
+from typing import NamedTuple, Protocol
 
 import numpy as np
 
@@ -27,6 +27,18 @@ class Beside(NamedTuple):
     """Its number in the segment."""
     paths: tuple[int, ...]
     """Its paths there, of `MusclePaths`."""
+
+
+class Routed(Protocol):
+    """A chain with routes, of statics or of motion."""
+
+    @property
+    def unknowns(self) -> Unknowns:
+        """The chain."""
+
+    @property
+    def routes(self) -> Routes:
+        """The routes."""
 
 
 @dataclass(frozen=True)
@@ -114,7 +126,7 @@ class Routes:
     @property
     def segments(self) -> list[Segment]:
         """The routed segments, base to tip."""
-        return list(self.unknowns.segments) if self.unknowns.chain.routed else []
+        return list(self.unknowns.segments) if self.unknowns.routed else []
 
     @property
     def components(self) -> int:

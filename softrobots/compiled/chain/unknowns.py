@@ -49,13 +49,15 @@ class Unknowns:
     """The chain."""
     locked: tuple[str, ...] = ()
     """Section strains that keep their rest value, of `strain_chain.STRAINS`."""
+    as_routes: bool = False
+    """Whether straight muscles along one segment each are taken as routes, too: motion does so with given lengths."""
 
     def __post_init__(self) -> None:
         """Refuse unknown names, strains that muscle lengths constrain, and all four at once."""
         for name in self.locked:
             if name not in STRAINS:
                 raise NameNotFound("section strain", name, STRAINS)
-        if self.locked and self.held_lengths:
+        if self.locked and self.held_lengths and not self.as_routes:
             raise ParameterError(
                 "locked_strains", self.locked, "empty for muscles of given length that wind or pass several segments"
             )
@@ -107,7 +109,7 @@ class Unknowns:
             number for number, group in enumerate(chain.constrained) if first <= self.chain.element_of[group[0]] <= last
         )
         stretched = tuple(one for one in muscles if self.held_lengths or chain.actuators[one].kind in STRETCHED)
-        ordered = [*stretched, *(one for one in muscles if one not in stretched)] if self.chain.routed else sorted(muscles)
+        ordered = [*stretched, *(one for one in muscles if one not in stretched)] if self.routed else sorted(muscles)
         return Segment(first, last, groups, tuple(ordered), stretched)
 
     @cached_property
@@ -184,7 +186,7 @@ class Unknowns:
         """Return the muscles beside an element."""
         paths, segment = self.chain.muscle_paths, self.segment_at(row)
         beside: list[ElementMuscle] = []
-        if segment is None or self.chain.routed:
+        if segment is None or self.routed:
             return beside
         for number, muscle in enumerate(segment.muscles):
             for path in np.flatnonzero((paths.muscle == muscle) & np.isin(paths.places, strains).any(axis=1)).tolist():
@@ -203,9 +205,14 @@ class Unknowns:
         return beside
 
     @property
+    def routed(self) -> bool:
+        """Whether the muscles are looped over, see `softrobots.compiled.chain.routes`."""
+        return self.as_routes or self.chain.routed
+
+    @property
     def held_lengths(self) -> bool:
         """Whether given lengths of routed muscles are constraints, each with a tension as multiplier."""
-        return self.chain.routed and self.chain.muscle_input == "lengths"
+        return self.routed and self.chain.muscle_input == "lengths"
 
     @property
     def n_constraints(self) -> int:

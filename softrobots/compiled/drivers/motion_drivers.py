@@ -34,8 +34,9 @@ def settle_middle(w: Array) -> bool:
             return True
         if w[CHANGE] > 1e3 * w[LAST_CHANGE]:
             return False
+        slow = w[CHANGE] > RENEW_SHARE * w[LAST_CHANGE]
         w[LAST_CHANGE] = w[CHANGE]
-        if step == 0:
+        if step == 0 or slow:
             motion_factor(w)
         else:
             motion_correct(w)

@@ -30,20 +30,31 @@ def lanes_to_settle(w: Array) -> float:
     return count
 
 
+def slow_lanes(w: Array) -> float:
+    """Return the number of lanes whose corrections shrink slowly, without those that have failed before."""
+    count = 0.0
+    for lane in range(LANES):
+        slow = where(w[CHANGE * LANES + lane] > RENEW_SHARE * w[LAST_CHANGE * LANES + lane], 1.0, 0.0)
+        count += slow * (1.0 - w[FAILED * LANES + lane])
+    return count
+
+
 def settle_middle_lanes(w: Array, n_history: int) -> None:
     """Find the accelerations of a step; mark the lanes that fail."""
     choose_order_lanes(w)
     for i in range(N):
         guess_unknown_lanes(w, i)
     fill_lanes(w, LAST_CHANGE, 1e300)
+    slow = 0.0
     for step in range(MOTION_CORRECTIONS):
-        if step == 1 or step + n_history == 0:
+        if step == 1 or step + n_history == 0 or slow > 0.5:
             motion_factor_lanes(w)
         else:
             motion_correct_lanes(w)
         fill_lanes(w, CHANGE, 0.0)
         for i in range(N):
             apply_correction_lanes(w, i)
+        slow = slow_lanes(w)
         if lanes_to_settle(w) < 0.5:
             break
     for lane in range(LANES):

@@ -7,14 +7,16 @@ from dataclasses import replace
 import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, vector
-from softrobots.compiled.chain.gauss_step import placing_blocks
+from softrobots.compiled.chain.gauss_step import keep_block, placing_blocks
 from softrobots.compiled.chain.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
 from softrobots.compiled.chain.motion_groups import motion_groups, reach_behind
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.moving_joints import MovingFrame, joint_state, moved
 from softrobots.compiled.chain.unrolled_chain import place_base
 from softrobots.compiled.program.looped_program import loop_text
+from softrobots.compiled.program.motion_actuators import actuator_parts
 from softrobots.compiled.program.motion_parts import MotionParts
+from softrobots.compiled.routes.motion_lengths import MASSIVE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import cosine, sine
 
@@ -31,7 +33,7 @@ _INWARD = ("articulate", "resist", "reduce")
 _MOVE = """    start_move_SUFFIX(w)
 BEND    move_all_SUFFIX(w)
 """
-_BEND = """    for i in range(N):
+_BEND = """    for i in range(N_STRAINS):
         bend_SUFFIX(w, i)
 """
 _ARTICULATE = """    start_articulate_SUFFIX(w)
@@ -40,9 +42,9 @@ _ARTICULATE = """    start_articulate_SUFFIX(w)
 _RESIST = """    start_resist_SUFFIX(w)
     resist_all_SUFFIX(w)
 """
-_AT_STAGES = f'''def resist_stage_SUFFIX(w: Array) -> None:
+_AT_STAGES = '''def resist_stage_SUFFIX(w: Array) -> None:
     """Evaluate the stage that is placed."""
-{_MOVE}{_RESIST}
+EVALUATE
 
 def resist_stages_SUFFIX(w: Array) -> None:
     """Evaluate both stages."""
@@ -51,40 +53,55 @@ def resist_stages_SUFFIX(w: Array) -> None:
     resist_stage_SUFFIX(w)
     for i in range(N):
         place_second_stage_SUFFIX(w, i)
+    for i in range(N_STRAINS):
+        keep_first_stage_SUFFIX(w, i)
     resist_stage_SUFFIX(w)
 
 
 '''
 _CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
     """Evaluate and factor; write the correction."""
-FACTOR    correct_all_SUFFIX(w)
-
+FACTOR
 
 def motion_correct_SUFFIX(w: Array) -> None:
     """Evaluate; write the correction with the factors that are there."""
-CORRECT    correct_all_SUFFIX(w)
-
+CORRECT
 
 def motion_tip_SUFFIX(w: Array) -> None:
     """Write the tip at motors and unknowns."""
-    start_place_SUFFIX(w)
+TIP    start_place_SUFFIX(w)
     place_all_SUFFIX(w)
     finish_place_SUFFIX(w)'''
 
 
-def _control(in_stages: bool, bends: bool) -> str:
+def _control(plan: MotionPlan, bends: bool) -> str:
     """Text of the functions that call the passes; `bends`: whether joints turn."""
-    evaluate, reduce = ("    resist_stages_SUFFIX(w)\n", "    reduce_all_SUFFIX(w)\n") if in_stages else (_MOVE, _RESIST)
-    text = _CONTROL.replace("FACTOR", evaluate + _ARTICULATE + reduce).replace("CORRECT", evaluate + reduce)
-    return (_AT_STAGES + text if in_stages else text).replace("BEND", _BEND if bends else "")
+    in_stages, routes = plan.layout.in_stages, plan.routes
+    held = routes is not None and routes.held
+    move, resist, articulate, solve = _MOVE, _RESIST, _ARTICULATE, "    correct_all_SUFFIX(w)\n"
+    if routes is not None:
+        move = f"    {'move_lengths' if held else 'follow_actuators'}_SUFFIX(w)\n" + move
+        resist += "    free_torques_SUFFIX(w)\n" if held else ""
+        articulate += "    factor_border_SUFFIX(w)\n"
+        solve = "    correct_strains_SUFFIX(w)\n" + ("    free_corrections_SUFFIX(w)\n" if held else "")
+    elif plan.reduces:
+        solve = "    reduce_all_SUFFIX(w)\n" + solve
+    resist += MASSIVE if plan.layout.full_damping and not held else ""
+    evaluate = ("    resist_stages_SUFFIX(w)\n", "") if in_stages else (move, resist)
+    text = _CONTROL.replace("FACTOR", evaluate[0] + articulate + evaluate[1] + solve)
+    text = text.replace("CORRECT", "".join(evaluate) + solve)
+    text = text.replace("TIP", "    close_lengths_SUFFIX(w)\n" if held else "")
+    text = _AT_STAGES.replace("EVALUATE", move + resist) + text if in_stages else text
+    return text.replace("BEND", _BEND if bends else "")
 
 
 def looped_motion(plan: MotionPlan) -> MotionParts:
     """Trace the functions of a looped chain."""
-    unknowns, layout = plan.unknowns, plan.layout
-    in_stages = layout.in_stages
-    passes = _PASSES | ({"reduce": _REDUCE} if in_stages else {})
-    places = GroupLayout(layout.prepared, layout.unknowns, 2 if in_stages else 1)
+    unknowns, layout, routes = plan.unknowns, plan.layout, plan.routes
+    in_stages, n = layout.in_stages, len(unknowns.strains)
+    passes = _PASSES | ({"reduce": _REDUCE} if plan.reduces else {})
+    places = GroupLayout(layout.prepared if routes is None else routes.end, n, 2 if in_stages else 1)
+    actuators = None if routes is None else actuator_parts(plan, routes)
     kinds = group_kinds(plan, places)
     record, sequence = places.end, {}
     calls: dict[str, list[tuple[int, str]]] = {name: [] for name in passes}
@@ -109,12 +126,16 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         _start_resist(plan, places),
         _start_place(plan, places, len(ordered)),
         _finish_place(plan, places),
-        *(placing_blocks(layout) if in_stages else []),
+        *([*placing_blocks(layout), keep_block(plan.torques[0], n)] if in_stages else []),
+        *([] if actuators is None else [_start_reduce(places), *actuators.blocks]),
+        *([_add_mass(plan)] if layout.full_damping else []),
     ]
+    tables |= {"N_STRAINS": n} | ({} if actuators is None else actuators.tables)
     loops, lane_loops = (
         [
+            *([] if actuators is None else actuators.loops(suffix)),
             *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
-            _control(in_stages, bends).replace("_SUFFIX", suffix),
+            (("" if actuators is None else actuators.after) + _control(plan, bends)).replace("_SUFFIX", suffix),
         ]
         for suffix in ("", "_lanes")
     )
@@ -146,7 +167,7 @@ def _start_move(places: GroupLayout) -> Block:
 def _bend(plan: MotionPlan, places: GroupLayout) -> Block:
     """They do not depend on each other, so that compilers vectorise the loop."""
     block = Block("bend", "Compute cosine and sine of an unknown.", ("i",))
-    angle = block.load(plan.layout.unknown, "i")
+    angle = block.load(plan.strains[0], "i")
     block.store(places.cosine, cosine(angle), "i")
     block.store(places.sine, sine(angle), "i")
     return block
@@ -162,6 +183,24 @@ def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
 def _start_resist(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_resist", "Start at the tip with its force, and clear all sums.")
     block.store_all(places.wrench, [0.0, 0.0, 0.0, *_tip_force(plan, block)])
+    block.store_all(places.sums, [0.0] * 6 * places.parts)
+    block.store_all(places.answer, [0.0] * 6 * places.parts)
+    return block
+
+
+def _add_mass(plan: MotionPlan) -> Block:
+    block, layout, routes = (
+        Block("add_mass", "Add a part of Rayleigh's term for the mass.", ("i", "at", "j")),
+        plan.layout,
+        plan.routes,
+    )
+    to = plan.last_torques if routes is None or not routes.held else routes.dampers
+    block.store(to, block.load(to, "i") + block.load(layout.mass_damping, "at") * block.load(layout.rate, "j"), "i")
+    return block
+
+
+def _start_reduce(places: GroupLayout) -> Block:
+    block = Block("start_reduce", "Clear the sums over the torques out of balance.")
     block.store_all(places.sums, [0.0] * 6 * places.parts)
     block.store_all(places.answer, [0.0] * 6 * places.parts)
     return block

@@ -52,18 +52,21 @@ class LoopedProgram:
         return loop_text(name, _PASSES[name.removesuffix("_tip")], self.calls[name], back=back, suffix=suffix)
 
 
-def loop_text(name: str, purpose: str, calls: Sequence[tuple[int, str]], *, back: bool, suffix: str = "") -> str:
+def loop_text(
+    name: str, purpose: str, calls: Sequence[tuple[int, str]], *, back: bool, suffix: str = "", prefix: str = ""
+) -> str:
     """Return the function of a pass: a loop over the elements that calls the function of the kind of each.
 
-    The bounds come from the workspace: compilers would unroll a loop whose length they know, for minutes.
+    The bounds come from the workspace: compilers would unroll a loop whose length they know, for minutes. The names of the
+    tables and of the bounds begin with `prefix`.
     """
     place = " * LANES" if suffix else ""
     lines = [
         f"def {name}_all{suffix}(w: Array) -> None:",
         f'    """{purpose}"""',
-        "    i = N_ELEMENTS - 1" if back else "    i = 0",
-        f"    while i {'>=' if back else '<'} w[{'FIRST' if back else 'COUNT'}{place}]:",
-        "        kind = KIND[i]",
+        f"    i = {prefix}N_ELEMENTS - 1" if back else "    i = 0",
+        f"    while i {'>=' if back else '<'} w[{'FIRST' if back else prefix + 'COUNT'}{place}]:",
+        f"        kind = {prefix}KIND[i]",
     ]
     word = "if"
     for kind in dict.fromkeys(kind for kind, _ in calls):
@@ -121,7 +124,7 @@ def looped_program(plan: Plan) -> LoopedProgram:
     constants |= tip.constants()
     constants |= {f"TABLE_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
     steps = dict(zip(("KIND", "AT", "ROW", "PLACE", "ELEMENT"), zip(*sequence, strict=True), strict=True))
-    constants |= {name: values for name, values in steps.items() if name != "ELEMENT" or unknowns.chain.routed}
+    constants |= {name: values for name, values in steps.items() if name != "ELEMENT" or unknowns.routed}
     constants["AT_TIP"] = tuple(at for _, at, *_ in tip_sequence)
     loops: list[tuple[str, str]] = []
     tip_loops: list[tuple[str, str]] = []
@@ -176,7 +179,7 @@ def _sequence(
         base = len(kinds) + 2 * number
         end = base + 1
         sequence.insert(segment.last + 1 - leading, (end, 0, 0, 0, 0))
-        if unknowns.chain.routed:
+        if unknowns.routed:
             blocks += [start_lengths(plan, number, segment), leave_segment(plan, number)]
             blocks += [keep_lengths(plan, number, segment)] if plan.tip is None else []
             outward_calls.append((end, f"keep_lengths_{number}(w)"))

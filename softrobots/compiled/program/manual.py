@@ -63,7 +63,7 @@ def _inputs(plan: Plan) -> list[Place]:
     if plan.weight:
         places.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
     if layout.muscles:
-        places.append(Place("ACTUATORS", layout.muscles, f"{_inputs_of(unknowns)}; put_muscles writes them"))
+        places.append(Place("ACTUATORS", layout.muscles, f"{inputs_of(unknowns)}; put_muscles writes them"))
     if unknowns.n_constraints:
         places.append(Place("START", n, "unknowns with the muscle lengths [rad or m]; put_muscles writes them"))
     starts = "for settle_from, reach and follow" if searches else "for settle_from"
@@ -111,7 +111,7 @@ def _results(plan: Plan, tip: TipLayout | None) -> list[Place]:
     return places
 
 
-def _inputs_of(unknowns: Unknowns) -> str:
+def inputs_of(unknowns: Unknowns) -> str:
     """Return what the inputs of the actuators along the body are."""
     kinds = {
         "tension": "tensions [N]",

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from softrobots.compiled import motion_settings
+from softrobots.compiled.chain.held_motion import in_motion
 from softrobots.compiled.chain.motion_layout import MotionPlan
 from softrobots.compiled.chain.time_step import step_blocks
 from softrobots.compiled.chain.unknowns import Unknowns
@@ -10,10 +11,9 @@ from softrobots.compiled.drivers import motion_drivers, motion_lane_drivers
 from softrobots.compiled.drivers.lane_drivers import load_block, load_case
 from softrobots.compiled.program.generated_module import Program, functions_of, lane_count, lane_text, module_text
 from softrobots.compiled.program.looped_motion_program import looped_motion
-from softrobots.compiled.program.manual import Place, motor_names, on_a_line, place_table, strain_names
+from softrobots.compiled.program.manual import Place, inputs_of, motor_names, on_a_line, place_table, strain_names
 from softrobots.compiled.program.motion_parts import unrolled_motion
 from softrobots.compiled.statuses import Status
-from softrobots.core.errors import ParameterError
 
 _STATUSES = {
     Status.CERTIFIED: "the step was taken",
@@ -21,35 +21,17 @@ _STATUSES = {
 }
 
 
-def check_motion(unknowns: Unknowns, *, full_damping: bool = False) -> None:
-    """Refuse robots whose motion is not compiled.
-
-    Raises:
-        ParameterError: If the motion of its actuators is not compiled, or the damping of a long chain is a matrix.
-    """
-    what = "a damping matrix (mass_damping)" if full_damping and not unknowns.is_unrolled else ""
-    if unknowns.chain.routed:
-        what = "actuators but those of given tension, each straight along one segment"
-    what = "given muscle lengths" if unknowns.chain.constrained else what
-    if what:
-        raise ParameterError("model", unknowns.chain.name, f"a robot without {what}, to have its motion compiled")
-
-
 def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order: int = 2) -> Program:
-    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix; `order`: of the steps.
-
-    Raises:
-        ParameterError: If the motion of its actuators is not compiled, or the damping of a long chain is a matrix.
-    """
-    check_motion(unknowns, full_damping=full_damping)
-    plan = MotionPlan(unknowns, full_damping, order)
+    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix; `order`: of the steps."""
+    plan = MotionPlan(in_motion(unknowns), full_damping, order)
     layout = plan.layout
-    parts = unrolled_motion(plan) if unknowns.is_unrolled else looped_motion(plan)
+    parts = unrolled_motion(plan) if plan.unknowns.is_unrolled else looped_motion(plan)
     blocks = [*parts.blocks, *step_blocks(layout)]
     docstring, places = _manual(plan)
     values: dict[str, object] = {name: value for name, value in vars(motion_settings).items() if name.isupper()}
     values |= layout.constants()
     values |= {"WORKSPACE_SIZE": parts.size, "LANE_SIZE": parts.size, "LANES": lane_count(parts.size)}
+    values["RENEW_SHARE"] = motion_settings.SLOW_TENDONS if plan.unknowns.routed else motion_settings.NEVER
     values |= {status.name: status.value for status in _STATUSES} | parts.constants
     text = module_text(docstring, values, blocks, parts.loops, functions_of(motion_drivers))
     batches = lane_text(blocks, parts.lane_loops, [load_block, load_case, *functions_of(motion_lane_drivers)])
@@ -62,9 +44,11 @@ def _manual(plan: MotionPlan) -> tuple[str, list[str]]:
     """Return the docstring, and the names of all places in it."""
     unknowns, layout = plan.unknowns, plan.layout
     n, m = layout.unknowns, layout.motors
-    muscles = f", and {unknowns.n_tensions} muscle tensions [N]" if unknowns.n_tensions else ""
-    names = f"motor joints [rad or m]: {motor_names(unknowns)}{muscles}"
-    damping = "damping matrix, row by row" if layout.full_damping else "damping of each unknown"
+    muscles, looped = inputs_of(unknowns), layout.strains is not None
+    names = f"motor joints [rad or m]: {motor_names(unknowns)}{f', then {muscles}' if muscles else ''}"
+    coordinates = "the free coordinates" if unknowns.held_lengths else strain_names(unknowns)
+    damping = "damping of each strain" if looped else "damping of each unknown"
+    damping = "damping matrix, row by row" if layout.full_damping and not looped else damping
     given = [Place("TIME_STEP", 1, "length of the step [s]")]
     if m:
         given.append(Place("MOTORS_BEGIN", m, f"at the beginning of the step, {names}"))
@@ -72,8 +56,11 @@ def _manual(plan: MotionPlan) -> tuple[str, list[str]]:
         given.append(Place("MOTORS_END", m, "the same at the end of the step"))
     given.append(Place("FORCE", 3, "force on the tip in the middle of the step [N], world axes"))
     given.append(Place("GRAVITY", 3, "gravity [m/s^2], world axes"))
-    given.append(Place("DAMPING", n * n if layout.full_damping else n, f"{damping} [N m s/rad or N s/m]"))
-    given.append(Place("POSITION", n, f"unknowns at the beginning [rad or m]: {strain_names(unknowns)}"))
+    given.append(Place("DAMPING", layout.mass_damping - layout.damping, f"{damping} [N m s/rad or N s/m]"))
+    if looped and layout.full_damping:
+        given.append(Place("MASS_DAMPING", n * n, "Rayleigh's factor times the mass matrix of the unknowns, row by row"))
+        given.append(Place("MASS_RATE", 1, "Rayleigh's factor [1/s]"))
+    given.append(Place("POSITION", n, f"unknowns at the beginning [rad or m]: {coordinates}"))
     given.append(Place("VELOCITY", n, "their velocities [rad/s or m/s]"))
     found = [
         Place("POSITION", n, "unknowns at the end [rad or m]"),

@@ -12,6 +12,7 @@ import numpy as np
 from softrobots.compiled.chain.elements import constants, vector
 from softrobots.compiled.chain.elimination import Outboard, eliminate_multipliers
 from softrobots.compiled.chain.plan import Plan
+from softrobots.compiled.chain.routes import Routed
 from softrobots.compiled.chain.unknowns import Segment
 from softrobots.compiled.settings import LARGEST_NUMBER
 from softrobots.compiled.trace.blocks import Block, hoist
@@ -55,7 +56,7 @@ def tension(tag: ActuatorTag, given: Scalar, beyond: Scalar) -> Tension:
     return Tension(value, 0.0, value * beyond)
 
 
-def keep_lengths(plan: Plan, number: int, segment: Segment) -> Block:
+def keep_lengths(plan: Routed, number: int, segment: Segment) -> Block:
     """Trace the function at the tip of the segment of this number on the outward pass."""
     routes, block = plan.routes, Block(f"keep_lengths_{number}", "Keep the lengths of the actuators of a segment.")
     for place, muscle in enumerate(segment.muscles):

@@ -19,6 +19,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import is_zero, outer, upper_triangle, vector
 from softrobots.compiled.chain.plan import Plan
+from softrobots.compiled.chain.routes import Routed
 from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.expressions import Scalar, larger, smaller, square_root
 from softrobots.model.serial_chain import strains_of
@@ -48,22 +49,23 @@ class _Point(NamedTuple):
     """Values of the coordinates that are not unknown."""
 
 
-def form_of(plan: Plan, row: int) -> Form:
+def form_of(plan: Routed, row: int) -> Form:
     """Return the form of an element of a routed segment."""
     one = plan.unknowns.traced(row)
     return Form(one.kind == "section", one.moving)
 
 
-def route_forms(plan: Plan) -> dict[str, Form]:
+def route_forms(plan: Routed) -> dict[str, Form]:
     """Return the forms of the elements of routed segments, by name."""
     return {str(number): form for number, form in enumerate(dict.fromkeys(form_of(plan, row) for row in plan.routes.beside))}
 
 
-def length_blocks(plan: Plan, name: str, form: Form) -> tuple[list[Block], TableColumns | None]:
+def length_blocks(plan: Routed, name: str, form: Form, swerving: int | None = None) -> tuple[list[Block], TableColumns | None]:
     """Trace the functions of the outward pass, and of the load; and return the table of points, None without any.
 
     They clear the slopes of an actuator, add a point of a route to its length and slopes, add the load of an actuator, and the
-    second derivatives of a point.
+    second derivatives of a point. In motion with given lengths another one adds the acceleration of a length at constant rates,
+    which stand at `q`, to that of its actuator from the place `swerving` on.
     """
     routes, k = plan.routes, len(form.moving)
     clear = Block(f"clear_slopes_{name}", "Clear the slopes of an actuator.", ("at",))
@@ -96,10 +98,16 @@ def length_blocks(plan: Plan, name: str, form: Form) -> tuple[list[Block], Table
     for place, index in enumerate(upper_triangle(k)):
         if not is_zero(curvature[index]):
             bend.store(routes.curvature + place, bend.load(routes.curvature + place) + curvature[index])
-    return [clear, load, begin, add, bend], columns
+    blocks = [clear, load, begin, add, bend]
+    if swerving is not None:
+        turn = Block(f"add_swerve_{name}", "Add the acceleration of a length.", ("row", "q", "number", "point"), add.trace)
+        rates = vector(turn.loads(0, k, "q"))
+        turn.store(swerving, turn.load(swerving, "number") + rates @ _second(form, turn, point) @ rates, "number")
+        blocks.append(turn)
+    return blocks, columns
 
 
-def _point(plan: Plan, form: Form, paths: Sequence[tuple[int, int]], columns: TableColumns) -> _Point:
+def _point(plan: Routed, form: Form, paths: Sequence[tuple[int, int]], columns: TableColumns) -> _Point:
     """Return a point of a route, as entries of the table of all."""
     chain, given = plan.unknowns.chain, plan.unknowns.chain.muscle_paths
     own = []  # places of the coordinates of the element in the path
@@ -125,7 +133,7 @@ def _point(plan: Plan, form: Form, paths: Sequence[tuple[int, int]], columns: Ta
     )
 
 
-def _add_section_point(plan: Plan, form: Form, block: Block, point: _Point) -> None:
+def _add_section_point(plan: Routed, form: Form, block: Block, point: _Point) -> None:
     """Trace length and slopes of a point beside a section, and keep the direction of the tangent, and one over its length."""
     routes, z = plan.routes, vector(point.locked)
     z[list(form.moving)] = block.loads(0, len(form.moving), "q")

@@ -8,18 +8,19 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.program.motion_program import check_motion, make_motion_program
+from softrobots.compiled.chain.held_motion import moving_coordinates
+from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks
+from softrobots.compiled.run.motion_damping import MotionDamping
 from softrobots.compiled.run.motion_runs import StepsTaken, first_grid, halve_to_tolerance, replay, take_batch, take_one
 from softrobots.compiled.run.results import CompiledMotion, MotionBatch, StepEnd
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
 from softrobots.core.errors import NotConverged
-from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.starting import first_kick, first_state
@@ -41,7 +42,8 @@ class CompiledDynamics(CompiledStatics):
         """Generate and load the code; call `softrobots.compile` instead."""
         super().__init__(model, backend, locked_strains)
         self._motion_runs: dict[tuple[bool, int], Any] = {}
-        self._dampings: dict[tuple[float | None, float], tuple[FloatArray, FloatArray, bool]] = {}
+        self._moving = list(moving_coordinates(self._unknowns))
+        self._damping = MotionDamping(model, self._unknowns.strains, self._moving)
 
     def simulate(
         self,
@@ -82,7 +84,7 @@ class CompiledDynamics(CompiledStatics):
         """
         end = positive_number("duration", duration, "s")
         path, load = MotorPath(self._model, q_motors, end), TimeLoad(self._model, force, None, end)
-        course = Course(path, load, SpringKicks(self._model, self._unknowns.strains))
+        course = Course(path, load, SpringKicks(self._model, self._moving))
         h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
         scheme = order_of_steps(order, h, self._model, path.constant and load.constant)
         run, given, damping = self._motion_code(gravity, damping_time, mass_damping, scheme)
@@ -167,15 +169,15 @@ class CompiledDynamics(CompiledStatics):
         """
         scheme = order_of_steps(order, time_step, self._model, np.ndim(q_motors) < 2)
         run, given, _ = self._motion_code(gravity, damping_time, mass_damping, scheme)
-        layout, n, strains = run.layout, self._model.n_springs, list(self._unknowns.strains)
+        layout, n, moving = run.layout, self._model.n_springs, self._moving
         q_motors = self._model.actuators.in_order(q_motors, "q_motors")
         path = [q_motors] * 3 if np.ndim(q_motors) < 2 else finite_array("q_motors", q_motors, (3, self._motors), "rad")
         state = finite_array("q_springs", q_springs, (n,), "rad"), finite_array("velocities", velocities, (n,), "rad/s")
         w = run.workspace()
         for place, values in [
             *given,
-            (layout.position, state[0][strains]),
-            (layout.velocity, state[1][strains]),
+            (layout.position, state[0][moving]),
+            (layout.velocity, state[1][moving]),
             (layout.force, finite_array("force", force, (3,), "N")),
             (layout.time_step, np.array([positive_number("time_step", time_step, "s")])),
             (layout.motors_begin, np.concatenate([self._actuation.checked(one) for one in path])),
@@ -237,8 +239,8 @@ class CompiledDynamics(CompiledStatics):
         cases = MotionCases(self._model, self._actuation, end, q_motors, forces, starts)
         scheme = order_of_steps(order, h, self._model, cases.stand_still)
         run, given, _ = self._motion_code(gravity, damping_time, mass_damping, scheme)
-        strains, spring_kicks = list(self._unknowns.strains), SpringKicks(self._model, self._unknowns.strains)
-        springs, rates = (np.array(one[:, strains]) for one in cases.state)
+        spring_kicks = SpringKicks(self._model, self._moving)
+        springs, rates = (np.array(one[:, self._moving]) for one in cases.state)
         cases.kick(spring_kicks, 0.0, slice(None), springs, rates)
         values = [(run.layout.position, springs), (run.layout.velocity, rates), *((place, one[None]) for place, one in given)]
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
@@ -266,31 +268,29 @@ class CompiledDynamics(CompiledStatics):
 
     def _motion_code(self, gravity: Any, damping_time: Any, mass_damping: Any, order: int) -> tuple[Any, Any, FloatArray]:
         """Return the code, what stands in its workspace of gravity and damping, and the damping of the elastic coordinates."""
-        check_motion(self._unknowns)
         down = gravity_vector(gravity)
         alpha = non_negative_number("mass_damping", mass_damping, "1/s")
         beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
-        if (beta, alpha) not in self._dampings:
-            whole, strains = damping_matrix(self._model, beta, alpha), list(self._unknowns.strains)
-            matrix = whole[np.ix_(strains, strains)]
-            coupled = bool(np.any(matrix != np.diag(np.diag(matrix))))
-            self._dampings[beta, alpha] = whole, matrix.ravel() if coupled else np.diag(matrix), coupled
-        damping, own, full = self._dampings[beta, alpha]
+        full = alpha > 0.0
         if (full, order) not in self._motion_runs:
             program = make_motion_program(self._unknowns, full_damping=full, order=order)
             self._motion_runs[full, order] = make_run(program, self._backend)
         run = self._motion_runs[full, order]
-        return run, [(run.layout.damping, own), (run.layout.gravity, down)], damping
+        given = [*self._damping.inputs(run.layout, beta, alpha), (run.layout.gravity, down)]
+        return run, given, self._damping.matrix(beta, alpha)
 
     def _first_state(self, course: Course, start: Any) -> tuple[FloatArray, FloatArray]:
         """Return unknowns and rates at time zero, each shape (n,), after the motors have begun to move."""
-        first, m, strains = first_state(self._model, start, course.path), self._motors, list(self._unknowns.strains)
-        springs, rates = first.x[m:][strains], first.rates[m:][strains]
+        first, m = first_state(self._model, start, course.path), self._motors
+        springs, rates = first.x[m:][self._moving], first.rates[m:][self._moving]
         change = first_kick(course.path, first.rates[:m])
         return springs, rates if change is None else rates + course.spring_kicks.at(first.x[:m], springs, change)
 
     def _elastic_state(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return elastic coordinates and rates, each shape (..., n_springs), from unknowns and their rates."""
-        n = state.shape[-1] // 2
-        elastic = self._actuation.elastic
-        return elastic(state[..., :n].copy()), elastic(state[..., n:].copy()) - elastic(np.zeros(n))
+        n, count = state.shape[-1] // 2, self._model.n_springs
+        if n == count:
+            return state[..., :n].copy(), state[..., n:].copy()
+        springs, rates = np.tile(self._model.rest, (*state.shape[:-1], 1)), np.zeros((*state.shape[:-1], count))
+        springs[..., self._moving], rates[..., self._moving] = state[..., :n], state[..., n:]
+        return springs, rates

@@ -18,10 +18,12 @@ from softrobots.compiled.settings import HIDDEN, LEAST_SIZE, SEARCH_STEPS
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastic_state import ElasticState, elastic_state
+from softrobots.statics.loads import Load
 from softrobots.statics.tip_force.force_search import Directions, search_force, torque_tolerance
-from softrobots.statics.tip_goal import Goal
+from softrobots.statics.tip_goal import Goal, LoadedTip, taken_up
 from softrobots.statics.tip_search import LocalSolution, advance, search
-from softrobots.statics.tip_steps import TipModel
+from softrobots.statics.tip_steps import Pull, TipModel
 
 _ROUNDING = 1e-9  # by which a motor may be beyond its limits [rad, m or N]
 
@@ -33,6 +35,8 @@ class ChainState(NamedTuple):
     """The workspace, not shared."""
     q_springs: FloatArray
     """Elastic coordinates, shape (n_springs,) [rad or m]."""
+    pulled: ElasticState | None = None
+    """The robot there in Pinocchio, where its tensions are sought, too."""
 
 
 class LoopedSearch:
@@ -245,7 +249,19 @@ class _SoughtTip:
         status, state = self.chain.settle(q_motors, self.force, self.gravity, start)
         if status != Status.CERTIFIED:
             return None
-        return LocalSolution(q_motors, state, float(np.linalg.norm(self.missing(state))))
+        excess = 0.0
+        if self.model.actuators.least_tension:
+            pulled = elastic_state(self.model, q_motors, state.q_springs, self._loaded.load)
+            taut, excess = taken_up(self.model, q_motors, pulled)
+            if not np.array_equal(taut, q_motors):
+                return self.solve(taut, state.q_springs)
+            state = state._replace(pulled=pulled)
+        return LocalSolution(q_motors, state, float(np.linalg.norm(self.missing(state))), excess=excess)
+
+    @property
+    def _loaded(self) -> LoadedTip:
+        """The same on Pinocchio, for the derivatives of tensions."""
+        return LoadedTip(self.model, Goal(self.target), Load.of(self.model, force=self.force, gravity=self.gravity))
 
     def missing(self, state: ChainState) -> FloatArray:
         return np.asarray(self.target - self.chain.tip(state.w))
@@ -254,9 +270,12 @@ class _SoughtTip:
         """Nothing: there are no obstacles."""
         return []
 
-    def pull(self, state: ChainState, follow: FloatArray) -> None:
-        """Tensions are not sought here: the change of the actuators is the least."""
+    def pull(self, state: ChainState, follow: FloatArray) -> Pull | None:
+        """Return the tensions with their derivatives; None of muscles of given length that push."""
+        return None if state.pulled is None else self._loaded.pull(state.pulled, follow)
 
     def motion(self, state: ChainState) -> tuple[FloatArray, FloatArray]:
-        """Return the Jacobian of the tip, and zeros for the springs, which follow by their first Newton step."""
+        """Return the Jacobian of the tip, and how the springs follow; zeros without tensions: their first Newton step tells."""
+        if state.pulled is not None:
+            return self._loaded.motion(state.pulled)
         return self.chain.jacobian(state.w), np.zeros((len(state.q_springs), self.model.n_motors))

@@ -188,8 +188,9 @@ class MotionBatches:
         for i in range(layout.unknowns):
             functions.guess_unknown(w, i)
         w[layout.last_change] = np.full(len(failed), 1e300)
+        slow = False
         for correction in range(MOTION_CORRECTIONS):
-            if correction == 1 or correction + n_history == 0:
+            if correction == 1 or correction + n_history == 0 or slow:
                 functions.motion_factor(w)
             else:
                 functions.motion_correct(w)
@@ -200,6 +201,7 @@ class MotionBatches:
             settled = w[layout.settled] > 0.5
             if np.all(settled | failed):
                 break
+            slow = bool(np.any((w[layout.change] > self._alone.RENEW_SHARE * w[layout.last_change]) & ~failed))
             w[layout.last_change] = w[layout.change]
         for i in range(layout.unknowns):
             functions.finish_unknown(w, i)
