@@ -224,6 +224,7 @@ def test_derivatives_of_random_cases(cases: int) -> None:
 
 
 @pytest.mark.study
+@pytest.mark.timeout(1800)
 @pytest.mark.shortened(400, 100_000)
 def test_derivatives_of_random_load_estimates(cases: int) -> None:
     """The same of load estimates, from the torques of random forces; of robots with three motors, which feel every force.
@@ -283,7 +284,7 @@ def check_random(
     )
     error, doubt = (np.abs(one).max(axis=1) for one in (near - slopes, near - wide))
     middle = 0.5 * (ends[2] + ends[3]) - np.concatenate(results, axis=1)  # of second order, but where another force is found
-    good = np.abs(middle).max(axis=1) <= step * (1.0 + np.abs(slopes).max(axis=1))
+    good = np.isfinite(doubt) & (np.abs(middle).max(axis=1) <= step * (1.0 + np.abs(slopes).max(axis=1)))
     tolerated = tolerance * (1.0 + np.abs(slopes).max(axis=1))
     assert np.mean(error[good] <= tolerated[good]) > 0.9
     missed = 0.0 if forces is None else 1e3 * np.abs(results[2] - forces).max(axis=1) * (1.0 + np.abs(slopes).max(axis=1))
