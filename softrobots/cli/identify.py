@@ -23,10 +23,12 @@ from softrobots.identification.cross_validation import CrossValidation, cross_va
 from softrobots.identification.fit import INTERRUPTED
 from softrobots.identification.identification import Identification
 from softrobots.identification.identify import LOSSES, identify
+from softrobots.identification.measured_robot import frame_of
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.suspicions import doubtful_sizes
 from softrobots.model.soft_model import SoftModel
+from softrobots.robots.placed_robot import Marker, RobotPlacement
 from softrobots.view.figures.canvas import write_png
 from softrobots.view.figures.experiments import cross_validation
 from softrobots.view.figures.identifications import identification_figures
@@ -103,7 +105,7 @@ def run(arguments: argparse.Namespace) -> bool:
     if arguments.output is not None:
         for name in (*_FILES, *(f"{picture}.png" for picture in _PICTURES)):
             new_file(arguments.output / name, overwrite=arguments.overwrite)
-    model = statics_model_of(arguments)
+    model = statics_model_of(arguments, placed=False)  # base and markers are fitted anew
     rows = Measurements.from_csv(arguments.data, arguments.columns)
     rows.check(model)
     rows = rows.in_order_of(model)
@@ -130,7 +132,8 @@ def run(arguments: argparse.Namespace) -> bool:
     files = [] if arguments.output is None else _write(arguments, found, compared, answer, lines)
     if found.robot is not None and any(file.name == "robot.yaml" for file in files):
         lines += ["", f"as a robot: softrobots solve {arguments.output / 'robot.yaml'}"]
-        others = [one.name for one in found.parameters if one.place.kind != "field"]
+        kept = ("field", "base", "marker")
+        others = [one.name for one in found.parameters if one.place.kind not in kept]
         lines += [f"not parameters of the robot, so not in robot.yaml: {', '.join(others)}"] if others else []
     print_answer(arguments, answer, lines, files)
     if found.message == INTERRUPTED:
@@ -179,13 +182,25 @@ def _write(
     ]
     name = None if found.robot is None else name_of(found.robot)
     if name is not None:
-        files.append(write_robot(folder / "robot.yaml", name, found.robot, overwrite=overwrite))
+        placement = placement_of(found).values()
+        files.append(write_robot(folder / "robot.yaml", name, found.robot, placement, overwrite=overwrite))
     for draw in (_pictures, _page):
         try:
             files += draw(folder, found, compared, overwrite)
         except (MissingDependency, ViewerError) as error:
             warnings.warn(f"not all is drawn: {error}", stacklevel=1)
     return files
+
+
+def placement_of(found: Identification) -> RobotPlacement:
+    """Return base and markers that a fit has found; markers on what is no link are left out."""
+    parameters, marked = ParameterSet(found.model, found.parameters, found.fitted.measurements.markers), []
+    for name in dict.fromkeys(one.place.names[0] for _, one in parameters.places("marker")):
+        frame = frame_of(found.model, name, found.fitted.measurements.markers)
+        if found.model.pinocchio.existBodyName(frame):
+            marked.append(Marker(name, frame, tuple(parameters.marker_offset(found.solution, name).tolist())))
+    position, rotation = (tuple(one.tolist()) for one in parameters.base(found.solution))
+    return RobotPlacement(position, rotation, tuple(marked))
 
 
 def _pictures(folder: Path, found: Identification, compared: CrossValidation | None, overwrite: bool) -> list[Path]:

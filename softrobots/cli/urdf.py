@@ -68,8 +68,9 @@ def run(arguments: argparse.Namespace) -> bool:
     if isinstance(source, Path) and (arguments.output is not None or not arguments.check):
         requirement = "a robot, or a xacro, MJCF or SDF file; a URDF file can only be checked, with --check"
         raise ParameterError("ROBOT", str(source), requirement)
-    if arguments.save_parameters is not None and arguments.robot not in ROBOTS:
-        raise ParameterError("--save-parameters", str(arguments.save_parameters), f"given for one of {', '.join(ROBOTS)}")
+    if arguments.save_parameters is not None and (arguments.robot not in ROBOTS or isinstance(source, str)):
+        requirement = f"given for one of {', '.join(ROBOTS)}, without base and markers"
+        raise ParameterError("--save-parameters", str(arguments.save_parameters), requirement)
     for file in (arguments.output, arguments.save_parameters):
         if file is not None:
             new_file(file, overwrite=arguments.overwrite)  # refused before the work
@@ -97,7 +98,7 @@ def _write(arguments: argparse.Namespace, source: Robot | Path | str) -> dict[st
         files.append(write_text(arguments.output, read_source(source)[0], overwrite=arguments.overwrite))
     if arguments.save_parameters is not None:
         file, overwrite = arguments.save_parameters, arguments.overwrite
-        files.append(write_robot(file, arguments.robot, source, overwrite=overwrite))
+        files.append(write_robot(file, arguments.robot, source, {}, overwrite=overwrite))
     return {"files": files} if files else {}
 
 

@@ -52,6 +52,8 @@ class States(NamedTuple):
     """Tangent stiffness, shape (N, n_springs, n_springs)."""
     coupling: FloatArray
     """Derivative of the load on the elastic coordinates by the actuators, shape (N, n_springs, n_motors)."""
+    strains: FloatArray | None = None
+    """Strains, shape (N, n_strains), where they are known; tangent and coupling are not used where rows are."""
 
     @classmethod
     def of(cls, equilibria: Sequence[Equilibrium]) -> States:
@@ -91,11 +93,15 @@ class EquilibriumDerivatives:
         structure, held = model.structure, model.structure.muscle_lengths
         self.model, self.states, self.numbers, self._sections = model, states, numbers_of(model), _section_joints(model)
         self.n_joint_motors, self._n_singles = len(structure.motor_joints), len(structure.spring_joints)
-        self.inputs, self.strains = states.q_motors[:, self.n_joint_motors :], states.q_springs
-        """Inputs of the actuators along the body, shape (N, n_muscles), and strains, shape (N, n_strains)."""
+        self.inputs = states.q_motors[:, self.n_joint_motors :]
+        """Inputs of the actuators along the body, shape (N, n_muscles)."""
+        self.is_held = held is not None
+        """Whether lengths of actuators are given."""
+        self.strains = states.q_springs if states.strains is None else states.strains
+        """The strains, shape (N, n_strains)."""
         self.slopes: tuple[FloatArray, FloatArray] | None = None
         """Derivatives of the strains by given lengths, (N, n_strains, n_muscles), and by elastic coordinates; None: 0 and 1."""
-        if held is not None:
+        if held is not None and states.strains is None:
             points: list[Any] = [held.at(u, y) for u, y in zip(states.q_motors, states.q_springs, strict=True)]
             self.strains = np.array([point.strains for point in points])
             by_lengths, by_free = zip(*(point.strain_slopes for point in points), strict=True)
@@ -175,8 +181,15 @@ class EquilibriumDerivatives:
 class AdjointRows:
     """Rows of outputs of N equilibria, with their derivatives by everything, the equilibria following."""
 
-    def __init__(self, at: EquilibriumDerivatives, outputs: Outputs) -> None:
+    def __init__(
+        self, at: EquilibriumDerivatives, outputs: Outputs, solved: tuple[FloatArray, FloatArray] | None = None
+    ) -> None:
         """Solve for the rows.
+
+        Args:
+            at: The equilibria.
+            outputs: The outputs, without loads on actuators if the rows are known.
+            solved: The rows where they are known: `by_actuators`, and the strains of the virtual motion, (N, L, n_strains).
 
         Raises:
             NeutralEquilibrium: If the tangent stiffness of a state is singular.
@@ -189,10 +202,18 @@ class AdjointRows:
             self._by_pose, self._of_frame = np.zeros((shape[0], at.model.pinocchio.nv, shape[1], 6)), np.zeros((*shape, 6))
         else:
             self._by_pose, self._of_frame = at.tree.pose_slopes(outputs.frame, outputs.pose)
-        strains = np.zeros((*shape, at.strains.shape[1]))
+        self._lengths = np.zeros((*shape, at.model.n_motors - count))  # weights of the lengths of actuators at the same strains
+        self.by_actuators, strains = self._solved() if solved is None else solved
+        """Derivatives of the outputs by the actuators, shape (N, L, n_motors)."""
+        if at.is_held:
+            self._lengths = -self.by_actuators[..., count:]
+        self._move(strains)
+
+    def _solved(self) -> tuple[FloatArray, FloatArray]:
+        at, outputs, count = self._at, self._outputs, self._at.n_joint_motors
+        strains = np.zeros((*self._weights.shape[:2], at.strains.shape[1]))
         if at.slopes is not None:
             strains = self._weights[..., count:] @ np.swapaxes(at.slopes[0], -1, -2)
-        self._lengths = np.zeros((*shape, at.model.n_motors - count))  # weights of the lengths of actuators at the same strains
         self._move(strains, works=outputs.loads is not None)
         motors, elastic, _ = self._by_coordinates()
         by_actuators = np.zeros(self._weights.shape)
@@ -207,13 +228,9 @@ class AdjointRows:
             virtual = elastic @ at.compliance
         else:
             virtual, self._gaps = at.contact.rows_of(elastic, self._weights, outputs.forces)
-        self.by_actuators = by_actuators + virtual @ at.states.coupling
-        """Derivatives of the outputs by the actuators, shape (N, L, n_motors)."""
-        if at.contact is not None:
-            self.by_actuators += self._weights @ at.contact.loads_by_motors - self._gaps @ at.contact.by_motors
-        if at.slopes is not None:
-            self._lengths = -self.by_actuators[..., count:]
-        self._move(strains + (virtual if at.slopes is None else virtual @ np.swapaxes(at.slopes[1], -1, -2)))
+            by_actuators += self._weights @ at.contact.loads_by_motors - self._gaps @ at.contact.by_motors
+        strains = strains + (virtual if at.slopes is None else virtual @ np.swapaxes(at.slopes[1], -1, -2))
+        return by_actuators + virtual @ at.states.coupling, strains
 
     def by_contacts(self, parameters: ParameterSet) -> FloatArray:
         """What the parameters of the model add through gaps and contact load at constant coordinates, shape (N, L, P)."""
@@ -251,7 +268,7 @@ class AdjointRows:
             found["masses"] = np.swapaxes(by_masses, 1, 2)
         if not change.by_number.keys().isdisjoint(("stiffness", "rest", "moments")):
             found |= at.springs.slopes(self.virtual)
-        if at.slopes is not None and at.actuators is not None:
+        if at.is_held and at.actuators is not None:
             found |= self._of_held_directions(at.actuators)
         for name, rows in found.items():
             total += change.along(name, rows)

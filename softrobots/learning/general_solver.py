@@ -16,28 +16,23 @@ Given lengths leave combinations `y = E z` of the strains `z` free; `E` changes 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import lru_cache
+from functools import cached_property, lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.run.responses import Cases
-from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import LoadNotFound, NeutralEquilibrium, ParameterError
+from softrobots.core.errors import ParameterError
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
+from softrobots.learning.chain_responses import ChainResponses
+from softrobots.learning.row_solver import RowSolver
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
-from softrobots.statics.elastostatics import solve_springs
-from softrobots.statics.kinematics import frame_placement
-from softrobots.statics.load_estimation import estimate_load
-from softrobots.statics.loads import Load
-from softrobots.statics.stability import NEUTRAL, stability
+from softrobots.statics.elastic_state import elastic_state
 
-_FINE = 1e-12  # tolerance of equilibria, relative to their load
 _SIZE = 1 << 20  # numbers of the twists of a chunk of cases
 _JUMPS = 1e4  # change of a coefficient of `E` over the relative change of a parameter, above which it jumps
 
@@ -61,10 +56,19 @@ class GeneralSolver:
         change = self._change(values) if slopes else ModelChange(size, {})
         sizes = dict(zip(self._parameters.names, values, strict=True))
         model, compiled = self._at(values), self._compiled
+        same = compiled is not None and compiled.model == model
         responses = GeneralResponses(
-            model, change, sizes, self._weight, compiled if compiled is not None and compiled.model == model else None
+            model, change, sizes, self._weight, compiled if same else None, self._chain_responses if same else None
         )
         return responses, np.array(values).reshape(1, size), np.eye(size) if slopes else np.zeros((size, 0))
+
+    @cached_property
+    def _chain_responses(self) -> ChainResponses | None:
+        """The compiled derivatives of the robot as it is; None of chains that are not looped."""
+        compiled = self._compiled
+        if compiled is None or compiled.unknowns.is_unrolled:
+            return None
+        return ChainResponses(compiled, weight=self._weight)
 
     def _model(self, values: tuple[float, ...]) -> SoftModel:
         present = self._parameters.present
@@ -85,7 +89,7 @@ class _Slopes(NamedTuple):
     by_parameters: FloatArray
 
 
-class GeneralResponses:
+class GeneralResponses(RowSolver):
     """Solvers of a robot at values of its parameters; see `softrobots.compiled.run.responses.Responses`."""
 
     def __init__(
@@ -95,57 +99,10 @@ class GeneralResponses:
         values: Mapping[str, float],
         weight: bool,
         compiled: CompiledModel | None,
+        chain: ChainResponses | None,
     ) -> None:
-        self._model, self._change, self._values, self._weight, self._compiled = model, change, values, weight, compiled
-
-    def equilibria(
-        self, motors: FloatArray, force: FloatArray, gravity: FloatArray, numbers: FloatArray, threads: int, count: int
-    ) -> list[Any]:
-        """Find equilibria from rest."""
-        model = self._model
-        if self._compiled is not None:
-            rows = (np.broadcast_to(one, (count, one.shape[1])) for one in (motors, force))
-            batch = self._compiled.equilibria(*rows, gravity=gravity if self._weight else None, threads=threads)
-            return [np.array(batch.q_springs), np.array(batch.tip_positions), np.array(batch.residual), batch.status]
-        springs, tips, errors, statuses = self._room(count)
-        for row, (at, push) in enumerate(_rows(count, motors, force)):
-            try:
-                checked = model.actuators.checked(at)
-            except ParameterError:
-                statuses[row] = Status.NOT_A_NUMBER
-                continue
-            load = self._load(push, gravity)
-            state, _, stable = solve_springs(model, checked, load, model.rest, tolerance=_FINE)
-            springs[row], tips[row], errors[row] = state.q_springs, self._tip(state.q), state.error
-            if not state.error <= largest_residual(model, state.scale, TOLERANCE):
-                statuses[row] = Status.UNSETTLED
-            elif not stable:
-                kind = stability(model, state.point, state.q, state.tangent).kind
-                statuses[row] = Status.NEUTRAL if kind == NEUTRAL else Status.UNSTABLE
-        return [springs, tips, errors, statuses]
-
-    def estimates(
-        self, motors: FloatArray, torques: FloatArray, gravity: FloatArray, numbers: FloatArray, threads: int, count: int
-    ) -> list[Any]:
-        """Find forces on the tip from the loads on the motors."""
-        springs, tips, errors, statuses = self._room(count)
-        forces = np.zeros((count, 3))
-        for row, (at, felt) in enumerate(_rows(count, motors, torques)):
-            try:
-                found = estimate_load(self._model, at, felt, gravity=gravity if self._weight else None)
-            except ParameterError:
-                statuses[row] = Status.NOT_A_NUMBER
-                continue
-            except (LoadNotFound, NeutralEquilibrium):
-                statuses[row] = Status.NOT_REACHED
-                continue
-            springs[row], tips[row], forces[row] = found.equilibrium.q_springs, found.equilibrium.tip_position, found.force
-            errors[row] = found.residual
-            if len(found.unobservable_directions):
-                statuses[row] = Status.UNOBSERVABLE
-            elif not found.equilibrium.stable:
-                statuses[row] = Status.UNSTABLE
-        return [springs, tips, forces, errors, statuses]
+        super().__init__(model, weight, compiled)
+        self._change, self._values, self._chain = change, values, chain
 
     def pull(
         self,
@@ -161,8 +118,11 @@ class GeneralResponses:
         model = self._model
         motors, load = np.zeros((count, model.n_motors)), np.zeros((count, 3 if kind == "equilibrium" else model.n_motors))
         sums = np.zeros(self._change.n_parameters)
+        weights = [np.broadcast_to(one, (count, one.shape[1])) for one in weights]
+        if kind == "equilibrium" and self._chain is not None:
+            return self._pull_compiled(self._chain, cases, gravity, weights, threads)
         for rows, at in self._chunks(cases, gravity, count, 1):
-            springs, tips, *forces = (np.broadcast_to(one, (count, one.shape[1]))[rows, None] for one in weights)
+            springs, tips, *forces = (one[rows, None] for one in weights)
             found = self._of_results(at, springs, tips)
             if forces:
                 felt = self._felt(at)
@@ -177,6 +137,20 @@ class GeneralResponses:
             sums += found.by_parameters.sum(axis=(0, 1))
         return motors, load, sums
 
+    def _pull_compiled(
+        self, chain: ChainResponses, cases: Cases, gravity: FloatArray, weights: Sequence[FloatArray], threads: int
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Pull by compiled code, and the parameters by the virtual motion that it finds."""
+        solved = chain.at(cases, gravity, len(weights[0]))
+        pulled = chain.pull(solved, weights[0], weights[1], threads)
+        sums = np.zeros(self._change.n_parameters)
+        for rows in self._parts(len(weights[0]), 1) if self._change.by_number else ():
+            known = pulled.motors[rows, None], pulled.strains[rows, None]
+            at = EquilibriumDerivatives(self._model, chain.states(solved, pulled, rows))
+            found = self._of_results(at, weights[0][rows, None], weights[1][rows, None], known)
+            sums += found.by_parameters.sum(axis=(0, 1))
+        return pulled.motors, pulled.force, sums
+
     def push(
         self,
         kind: str,
@@ -189,6 +163,10 @@ class GeneralResponses:
     ) -> list[FloatArray]:
         """Return rates of the results from those of motors, load and parameters; see `Responses.push`."""
         n = self._model.n_springs
+        if kind == "equilibrium" and self._chain is not None and not np.any(rates[2]):
+            solved = self._chain.at(cases, gravity, count)
+            of_motors, of_force = (np.broadcast_to(one, (count, one.shape[1])) for one in rates[:2])
+            return self._chain.push(solved, of_motors, of_force, threads)
         rows_of_results = np.eye(n + 3)
         moved = np.zeros((count, n + 6 if kind == "estimate" else n + 3))
         for rows, at in self._chunks(cases, gravity, count, n + 3):
@@ -205,12 +183,12 @@ class GeneralResponses:
             moved[rows, : n + 3] = whole[..., 0]
         return np.split(moved, range(n, moved.shape[1], 3)[: 1 if kind == "equilibrium" else 2], axis=1)
 
-    def _of_results(self, at: EquilibriumDerivatives, springs: FloatArray, tips: FloatArray) -> _Slopes:
-        """Derivatives of weighted elastic coordinates and tips, shapes (N, L, ...)."""
+    def _of_results(self, at: EquilibriumDerivatives, springs: FloatArray, tips: FloatArray, solved: Any = None) -> _Slopes:
+        """Derivatives of weighted elastic coordinates and tips, shapes (N, L, ...); `solved`: see `AdjointRows`."""
         held = self._model.structure.muscle_lengths
         weights: FloatArray = springs if held is None else np.asarray(springs @ held.elastic)
         pose = np.concatenate([tips, np.zeros_like(tips)], axis=-1)
-        found = self._slopes(at, Outputs(frame=self._model.tip, pose=pose, strains=weights))
+        found = self._slopes(at, Outputs(frame=self._model.tip, pose=pose, strains=weights), solved)
         if held is not None and np.any(springs):
             self._check_coordinates()
             turned = self._change.along("held_elastic", springs[..., None] * at.strains[:, None, None])
@@ -230,8 +208,8 @@ class GeneralResponses:
         weights = np.eye(self._model.n_motors)[self._model.actuators.feels]
         return self._slopes(at, Outputs(loads=np.tile(weights, (len(at.strains), 1, 1))))
 
-    def _slopes(self, at: EquilibriumDerivatives, outputs: Outputs) -> _Slopes:
-        rows = AdjointRows(at, outputs)
+    def _slopes(self, at: EquilibriumDerivatives, outputs: Outputs, solved: Any = None) -> _Slopes:
+        rows = AdjointRows(at, outputs, solved)
         return _Slopes(rows.by_actuators, rows.by_loads()[self._model.tip][..., :3], rows.by_numbers(self._change))
 
     def _chunks(
@@ -239,12 +217,10 @@ class GeneralResponses:
     ) -> Iterator[tuple[slice, EquilibriumDerivatives]]:
         """Yield some of the cases after another, and the robot at them."""
         model = self._model
-        step = max(1, _SIZE // (6 * outputs * max(1, model.pinocchio.nv)))
         motors, force, springs = (
             np.broadcast_to(one, (count, one.shape[1])) for one in (cases.motors, cases.force, cases.unknown)
         )
-        for first in range(0, count, step):
-            rows = slice(first, min(first + step, count))
+        for rows in self._parts(count, outputs):
             states = [
                 elastic_state(model, at, here, self._load(push, gravity))
                 for at, push, here in zip(motors[rows], force[rows], springs[rows], strict=True)
@@ -259,19 +235,8 @@ class GeneralResponses:
                 EquilibriumDerivatives(model, States(motors[rows], springs[rows], loads, of_actuators, tangent, coupling)),
             )
 
-    def _load(self, force: FloatArray, gravity: FloatArray) -> Load:
-        wrench = np.concatenate([force, np.zeros(3)])
-        return Load({self._model.tip: wrench}, tuple(gravity.tolist()) if self._weight else None)
-
-    def _tip(self, q: FloatArray) -> FloatArray:
-        return np.array(frame_placement(self._model, q, self._model.tip).translation)
-
-    def _room(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray, Any]:
-        """Arrays for elastic coordinates, tips, errors and statuses."""
-        springs, tips, errors = np.zeros((count, self._model.n_springs)), np.zeros((count, 3)), np.full(count, np.inf)
-        return springs, tips, errors, np.full(count, Status.CERTIFIED)
-
-
-def _rows(count: int, *arrays: FloatArray) -> Iterator[tuple[FloatArray, ...]]:
-    """Yield the rows of arrays of `count` rows, or of one for all."""
-    return zip(*(np.broadcast_to(one, (count, one.shape[1])) for one in arrays), strict=True)
+    def _parts(self, count: int, outputs: int) -> Iterator[slice]:
+        """Yield the rows of one chunk of cases after another."""
+        step = max(1, _SIZE // (6 * outputs * max(1, self._model.pinocchio.nv)))
+        for first in range(0, count, step):
+            yield slice(first, min(first + step, count))

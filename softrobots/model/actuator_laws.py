@@ -72,12 +72,12 @@ class ActuatorLaws:
         """Rounding of the load of stiff tendons [N]: that of some lengths times the stiffness."""
 
     def at(self, elongations: FloatArray, inputs: FloatArray) -> Tensions:
-        """Return the tensions at lengths beyond those at rest [m] and at inputs, each shape (n_muscles,)."""
-        found = Tensions(*np.zeros((4, len(self.kinds))))
+        """Return the tensions at lengths beyond those at rest [m] and at inputs, each shape (..., n_muscles)."""
+        found = Tensions(*np.zeros((4, *elongations.shape)))
         for kind, places in self._of.items():
-            parts = getattr(self, f"_{kind}")(places, elongations[places], inputs[places])
+            parts = getattr(self, f"_{kind}")(places, elongations[..., places], inputs[..., places])
             for array, part in zip(found, parts, strict=True):
-                array[places] = part
+                array[..., places] = part
         return found
 
     def taken_up(self, elongations: FloatArray, inputs: FloatArray, tension: float) -> FloatArray:

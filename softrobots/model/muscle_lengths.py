@@ -108,6 +108,20 @@ class MuscleLengths:
         """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
         return self._solve(motors, elastic)[1]
 
+    def strains_of_many(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
+        """The same, shape (N, count), of N rows of motors and free coordinates in which lengths are met without a fold."""
+        given = (motors[:, -len(self._tags) :] - self.paths.rest) @ self.slopes.T
+        free, sums, worst = elastic @ self.free.T, given, np.inf
+        for _ in range(_STEPS):
+            strains = sums @ self.shares.T + free
+            paths = self.paths.at(strains)
+            gap = sums - given + paths.excess @ self.slopes.T
+            last, worst = worst, float(np.abs(gap).max(initial=0.0))
+            if worst <= _ROUNDING or (last <= _CLOSED and worst >= last):
+                break
+            sums = sums - np.linalg.solve(self.gap_slope(paths), gap[..., None])[..., 0]
+        return np.asarray(strains)
+
     def _solve(self, motors: FloatArray, elastic: FloatArray) -> tuple[FloatArray, FloatArray, MusclePathsAt, bool]:
         """Sums of the strains at given lengths and free coordinates, the strains, the paths, and whether lengths are met."""
         free, given = self.free @ elastic, self.slopes @ self._change(motors)
@@ -125,7 +139,7 @@ class MuscleLengths:
         return sums, strains, paths, paths.valid and worst <= _CLOSED
 
     def gap_slope(self, paths: MusclePathsAt) -> FloatArray:
-        """Derivative `A` of the constraint with respect to the sums, shape (n_held, n_held)."""
+        """Derivative `A` of the constraint with respect to the sums, shape (..., n_held, n_held)."""
         return np.asarray(np.eye(len(self.slopes)) + self.slopes @ (paths.slopes @ self.shares))
 
     def _change(self, motors: FloatArray) -> FloatArray:

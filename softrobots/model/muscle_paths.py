@@ -20,6 +20,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -119,7 +120,7 @@ def _tangent(point: RoutePoint, row: SectionRow) -> tuple[float, FloatArray]:
 
 
 class MusclePathsAt:
-    """Lengths of the actuators at given strains, with derivatives; `excess` also for many rows of strains."""
+    """Lengths of the actuators at given strains, with derivatives; `excess` and `slopes` also for many rows of strains."""
 
     def __init__(self, paths: MusclePaths, strains: FloatArray) -> None:
         """Evaluate the paths along all sections."""
@@ -173,20 +174,21 @@ class MusclePathsAt:
 
     @cached_property
     def slopes(self) -> FloatArray:
-        """Derivative of the excess with respect to the strains, shape (n_muscles, count)."""
-        paths = self._paths
-        slopes = np.zeros((len(paths.rest), paths.count + 1))
-        np.add.at(slopes, (paths.muscle[:, None], paths.places), self._slopes_of_paths)
-        return slopes[:, : paths.count]
+        """Derivative of the excess with respect to the strains, shape (..., n_muscles, count)."""
+        paths, each = self._paths, self._slopes_of_paths
+        slopes = np.zeros((*each.shape[:-2], len(paths.rest), paths.count + 1))
+        places: Any = (..., paths.muscle[:, None], paths.places)
+        np.add.at(slopes, places, each)
+        return slopes[..., : paths.count]
 
     @property
     def _slopes_of_paths(self) -> FloatArray:
-        """Derivative of the excess of each path with respect to the section coordinates, shape (n_paths, 4)."""
+        """Derivative of the excess of each path with respect to the section coordinates, shape (..., n_paths, 4)."""
         paths, size = self._paths, self._size
         back = np.where(paths.separable, 0.0, -(self._across**2) / (size * (size + self._along)))
-        each = paths.arms * back[:, None] + paths.across[:, 0] * (self._around / size)[:, None]
+        each = paths.arms * back[..., None] + paths.across[:, 0] * (self._around / size)[..., None]
         if paths.conical:
-            each += paths.across[:, 1] * (self._radial / size)[:, None]
+            each += paths.across[:, 1] * (self._radial / size)[..., None]
         return np.asarray(each)
 
     @property

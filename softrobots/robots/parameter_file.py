@@ -1,7 +1,8 @@
 """Files of robot parameters: YAML, or JSON if the name ends with `.json`.
 
 One mapping from the names of parameters to numbers, words, truth values, `null`, or lists of those; `robot:` may name the robot
-that they are for. A route of an actuator is a mapping in a list:
+that they are for. Base and markers that a fit has found stand beside them (`softrobots.robots.placed_robot`). A route of an
+actuator is a mapping in a list:
 
     robot: pcc_arm
     segment_lengths: [0.5, 0.4]  # m
@@ -31,6 +32,9 @@ from softrobots.robots import ROBOTS, Route, XacroRobot, robot_class
 
 LARGEST_FILE = 100_000
 """Largest size of a file [bytes]."""
+
+PLACEMENT = ("base_position", "base_rotation", "markers")
+"""Names of what a file holds that is no parameter of a robot; see `softrobots.robots.placed_robot`."""
 
 _LARGEST_NUMBER = 1e300
 _PLAIN = re.compile(r"[A-Za-z_][A-Za-z0-9_]*")
@@ -73,7 +77,9 @@ def read_parameters(path: str | os.PathLike[str]) -> ParameterFile:
 
 
 def read_robot(path: str | os.PathLike[str], robot: str | None = None) -> XacroRobot:
-    """Return a robot with the parameters of a file.
+    """Return a robot with the parameters of a file, without the base and the markers that it may have.
+
+    `softrobots.robots.placed_robot.read_placed_robot` returns the robot with both.
 
     Args:
         path: The file.
@@ -86,6 +92,11 @@ def read_robot(path: str | os.PathLike[str], robot: str | None = None) -> XacroR
         SelfIntersection: If a helical tube would run into itself.
     """
     owner, values = read_parameters(path)
+    return robot_of(owner, {name: value for name, value in values.items() if name not in PLACEMENT}, robot)
+
+
+def robot_of(owner: str | None, values: Mapping[str, Any], robot: str | None = None) -> XacroRobot:
+    """Return the robot of the content of a file, see `read_robot`, which has the same errors."""
     name = robot if robot is not None else owner
     if name is None:
         raise ParameterError("robot", robot, f"given here or in the file: {', '.join(ROBOTS)}")

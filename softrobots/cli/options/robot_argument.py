@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -22,6 +23,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.robots import ROBOTS, Robot, XacroRobot
 from softrobots.robots.fields import argument_text
 from softrobots.robots.parameter_file import read_parameters
+from softrobots.robots.placed_robot import RobotPlacement
 
 
 def add_robot(parser: argparse.ArgumentParser, *, optional: bool = False, option: bool = False) -> None:
@@ -97,8 +99,12 @@ def spring(word: str) -> tuple[str, float | tuple[float, float] | None]:
     return joint, values
 
 
-def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
+def source_of(arguments: argparse.Namespace, *, placed: bool = True) -> Robot | Path | str:
     """Return what the arguments of `add_robot` name: a robot, the path of a URDF file, or URDF text made from another file.
+
+    Args:
+        arguments: The parsed arguments.
+        placed: Whether the robot stands where a file of parameters says, with its markers; otherwise a warning tells that not.
 
     Raises:
         NameNotFound: If there is no such robot, file or parameter.
@@ -118,8 +124,12 @@ def source_of(arguments: argparse.Namespace) -> Robot | Path | str:
         owner, values = read_parameters(arguments.parameter_file)
         if owner not in (None, robot, Path(robot).name):
             raise ParameterError("ROBOT", robot, f"{owner}, for which {arguments.parameter_file} is")
+    placement = RobotPlacement.taken_from(values) if robot in ROBOTS else RobotPlacement()
+    if placement.values() and not placed:
+        warnings.warn(f"base and markers of {arguments.parameter_file or arguments.robot} are left out", stacklevel=1)
+        placement = RobotPlacement()
     if robot in ROBOTS:
-        return make_robot(robot, parameters, values)
+        return placement.place(make_robot(robot, parameters, values))
     file = robot_file(robot)
     if file.suffix == ".xacro":
         known = xacro_parameters(file)
@@ -152,14 +162,16 @@ def model_of(arguments: argparse.Namespace, source: Robot | Path | str | None = 
     return load_model(source, springs=springs or None, tip=arguments.tip, muscles=arguments.muscles)
 
 
-def statics_model_of(arguments: argparse.Namespace) -> SoftModel:
+def statics_model_of(arguments: argparse.Namespace, *, placed: bool = True) -> SoftModel:
     """Return the same model for a command that solves; robots too large for Pinocchio's workspace are refused beforehand.
+
+    See `source_of` for `placed`.
 
     Raises:
         SoftRobotsError: Whatever `source_of` and `load_model` raise.
         ParameterError: If the robot has too many joints, or a joint is given two springs.
     """
-    source = source_of(arguments)
+    source = source_of(arguments, placed=placed)
     if isinstance(source, XacroRobot):
         given = {"--set": " ".join(arguments.parameters), "--parameters": arguments.parameter_file, "ROBOT": arguments.robot}
         option = next(name for name, value in given.items() if value)

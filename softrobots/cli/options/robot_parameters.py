@@ -129,12 +129,12 @@ def name_of(robot: XacroRobot) -> str | None:
     return None
 
 
-def write_robot(path: Path, name: str, robot: Any, *, overwrite: bool) -> Path:
-    """Write all parameters of a robot of `ROBOTS` to a file with their units; errors are those of `write_parameters`."""
+def write_robot(path: Path, name: str, robot: Any, placement: Mapping[str, Any], *, overwrite: bool) -> Path:
+    """Write all parameters of a robot of `ROBOTS`, and where it stands, to a file; errors are those of `write_parameters`."""
     known = robot_parameters(name)
     values = {parameter.name: _shortest(robot, parameter.name) for parameter in known}
-    units = {parameter.name: parameter.unit for parameter in known}
-    return write_parameters(path, name, values, units=units, overwrite=overwrite)
+    units = {parameter.name: parameter.unit for parameter in known} | {"base_position": "m", "base_rotation": "rad"}
+    return write_parameters(path, name, values | dict(placement), units=units, overwrite=overwrite)
 
 
 def first_sentence(name: str) -> str:

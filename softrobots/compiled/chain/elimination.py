@@ -190,13 +190,16 @@ def _symmetric_outer(one: Any, scaled: Any) -> Any:
     return product
 
 
-def eliminate_multipliers(beyond: Outboard, gaps: Sequence[Scalar], scales: Sequence[Scalar]) -> tuple[Eliminated, Outboard]:
+def eliminate_multipliers(
+    beyond: Outboard, gaps: Sequence[Scalar], scales: Sequence[Scalar], *others: Sequence[Scalar]
+) -> tuple[Eliminated, Outboard]:
     """Eliminate the multipliers, the last components, at the base of their segment.
 
     Args:
         beyond: Sums of the outboard elements.
         gaps: Difference of each constrained sum from its given value; the first step closes them.
         scales: Compliance of the sums, to compare pivots with.
+        *others: Gaps of further right-hand sides; by default zero.
 
     Returns:
         The factors of the multipliers, and the sums without them.
@@ -205,6 +208,6 @@ def eliminate_multipliers(beyond: Outboard, gaps: Sequence[Scalar], scales: Sequ
     n = len(beyond.matrix) - count
     unit = constants(np.concatenate([np.zeros((n, count)), np.eye(count)]))
     zeros = constants(np.zeros((n + count, count)))
-    values: list[Sequence[Scalar]] = [gaps, *([0.0] * count for _ in beyond.columns[1:])]
+    values: list[Sequence[Scalar]] = [gaps, *(others or [[0.0] * count for _ in beyond.columns[1:]])]
     eliminated, rest = eliminate(beyond, unit, zeros, constants(np.zeros((count, count))), values, scales, multipliers=True)
     return replace(eliminated, coupling=eliminated.coupling[:, :n]), rest.resized(n)

@@ -44,7 +44,7 @@ def beyond_history(layout: MotionLayout, block: Block, stage: int, coasting: Sca
     last, *differences = (block.load(place, "i") for place in places)
     if stage == 0:
         block.store(layout.scale, 1.0 / larger(absolute(coasting), 1.0), "i")
-    beyond = (last - coasting) * block.load(layout.weights)
+    beyond: Scalar = (last - coasting) * block.load(layout.weights)
     for k, difference in enumerate(differences, 1):
         beyond = beyond + difference * block.load(layout.weights + k)
     return beyond

@@ -198,8 +198,10 @@ class TipLayout:
     """Number of unknowns."""
     n_constraints: int
     """Number of constrained sums."""
+    given: bool = False
+    """Whether loads and motions are given, one right-hand side, instead of unit forces on the tip, three of them."""
     jacobian: int = field(init=False)
-    """Elastostatic Jacobian of the motor joints (3, m) [m/rad or m/m]."""
+    """Elastostatic Jacobian of the motor joints (3, m) [m/rad or m/m]; of given loads the rate of their loads (1, m)."""
     motor_torques: int = field(init=False)
     """Load on each motor joint (m) [N m or N]."""
     tip_columns: int = field(init=False)
@@ -216,14 +218,37 @@ class TipLayout:
     """Their turns of all elements nearer to the base, and multipliers (18)."""
     bends: int = field(init=False)
     """Their sums of `c x` over the strains so far (9)."""
+    moved: int = field(init=False)
+    """Rate of the tip at given loads and motions, in the axes behind the leading motors, at the end in the world (3) [m]."""
+    base_force: int = field(init=False)
+    """Rate of the force in the axes behind the leading motors (3) [N]."""
+    loads: int = field(init=False)
+    """Given rates of the loads on the unknowns (n) [N m or N]."""
+    force: int = field(init=False)
+    """That of the force on the tip, world axes (3) [N]."""
+    motions: int = field(init=False)
+    """Those of the motor joints (m) [rad or m]."""
+    sums: int = field(init=False)
+    """Those of the constrained sums (h) [rad or m]."""
     end: int = field(init=False)
     """The first place behind."""
 
     def __post_init__(self) -> None:
         """Compute the places."""
-        m, n, h = self.motors, self.unknowns, self.n_constraints
-        results = dict(jacobian=3 * m, motor_torques=m, tip_columns=3 * n, constraint_loads=h, constraint_columns=3 * h)
-        assign_places(self, self.first, **results, twists=3 * m, column=18, turn=18, bends=9, end=0)
+        m, n, h, r = self.motors, self.unknowns, self.n_constraints, self.rows
+        results = dict(jacobian=r * m, motor_torques=m, tip_columns=r * n, constraint_loads=h, constraint_columns=r * h)
+        sums = dict(twists=3 * m, column=6 * r, turn=6 * r, bends=3 * r)
+        given = dict(moved=3, base_force=3, loads=n, force=3, motions=m, sums=h) if self.given else {}
+        assign_places(self, self.first, **results, **sums, **given, end=0)
+
+    @property
+    def rows(self) -> int:
+        """Number of right-hand sides, besides that of the balance."""
+        return 1 if self.given else 3
+
+    def each(self, first: int, size: int) -> list[int]:
+        """Return the place of a part of each of these, of this size."""
+        return [first + size * row for row in range(self.rows)]
 
     def constants(self) -> dict[str, int]:
         """Return the places of the results by their names in generated code."""

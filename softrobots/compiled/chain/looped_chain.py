@@ -4,7 +4,8 @@ Three passes per evaluation, each a loop: outward with the axes, inward with loa
 steps. Elements of a kind share their code; numbers in which they differ stand in a table, and values for a later pass in the
 record of the element in the workspace. The cost is proportional to the number of elements.
 
-The response of the tip (`softrobots.compiled.chain.looped_tip`) takes the same passes with three more right-hand sides.
+The response of the tip (`softrobots.compiled.chain.looped_tip`) takes the same passes with three more right-hand sides, that
+to given loads and motions (`softrobots.compiled.chain.looped_response`) with one.
 """
 
 from __future__ import annotations
@@ -17,7 +18,8 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Load, symmetric, vector
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, RouteSums
-from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
+from softrobots.compiled.chain.layout import Layout, RecursionLayout
+from softrobots.compiled.chain.looped_sides import before_by_lengths, follow_motor, given_loads, store_tip_step
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
@@ -90,9 +92,12 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
         loads,
         beyond,
         balance,
-        tip_columns=0 if tip is None else 3,
+        tip_columns=3 if tip is not None and not tip.given else 0,
+        given=given_loads(back, element, plan),
         pivot_shift=pivot_shift if tip is None else 0.0,
     )
+    if result.eliminated is None and tip is not None and tip.given:
+        follow_motor(back, result, tip)
     back.store_all(recursion.lever, [one for load in result.loads for one in load.lever])
     plan.store_outboard(back, result.beyond)
     if routes is not None and result.eliminated is not None:
@@ -111,7 +116,7 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
         )
         second = _store_step(step_pass, result, plan, held, routes is not None)
     else:
-        second = _store_tip_step(step_pass, back, result, plan, tip, multipliers, routes is not None)
+        second = store_tip_step(step_pass, back, result, plan, tip, multipliers, routes is not None)
     size = hoist([back, step_pass], out, [*state, pivot_shift, *second], 0, "at", overwritten=axes_loads)
     size += hoist([step_pass], back, second, size, "at", overwritten=state)
     return Kind(number, rows, [out, back, step_pass], columns, size)
@@ -171,12 +176,6 @@ def _store_factors(block: Block, routes: Routes, twists: Any, eliminated: Elimin
         block.store_all(routes.columns + routes.stride * side, column)
 
 
-def _before(block: Block, plan: Plan, k: int, routed: bool) -> list[list[Expression] | None]:
-    """Return what the lengths add to the turn of all elements nearer to the base, for each right-hand side."""
-    places = [plan.routes.before + plan.routes.stride * side for side in range(len(plan.turns))] if routed else []
-    return [block.loads(place, k) for place in places] or [None] * len(plan.turns)
-
-
 def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence[Scalar], routed: bool) -> list[Expression]:
     """Trace the Newton step of an element; return the sums of the elements before it.
 
@@ -186,7 +185,7 @@ def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence
     turn_loads, sum_loads = step_pass.loads(recursion.turn, 3 + len(held)), step_pass.loads(recursion.steps, 3)
     if result.eliminated is not None:
         turn = vector(turn_loads)
-        (before,) = _before(step_pass, plan, len(result.gradient), routed)
+        (before,) = before_by_lengths(step_pass, plan, len(result.gradient), routed)
         steps = result.eliminated.steps(0, turn, before)
         sums: list[Scalar] = list(sum_loads)
         residuals = vector(result.gradient) + result.constrained[: len(held)].T @ vector(held)
@@ -197,31 +196,6 @@ def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence
         step_pass.store_all(recursion.steps, sums)
         return [*turn_loads, *sum_loads, *(before or ())]
     return [*turn_loads, *sum_loads]
-
-
-def _store_tip_step(
-    step_pass: Block, back: Block, result: InwardPass, plan: Plan, tip: TipLayout, multipliers: int, routed: bool
-) -> list[Expression]:
-    """Trace the response of an element to a force on the tip; for a motor, its column of the Jacobian so far."""
-    layout = plan.layout
-    turn_loads = [step_pass.loads(place, 3 + multipliers) for place in plan.turns]
-    bend_loads = [step_pass.loads(tip.bends + 3 * axis, 3) for axis in range(3)]
-    before = _before(step_pass, plan, len(result.gradient), routed)
-    if result.eliminated is None:
-        twist, bend = result.motion.twists[:, 0], result.motion.bends[:, 0]
-        back.store(tip.motor_torques, result.motion.torque[0], "q")
-        for axis, (nearer, turn) in enumerate(zip(bend_loads, turn_loads[1:], strict=True)):
-            follow = result.motion.moves[axis, 0] - twist @ vector(nearer) + bend @ vector(turn[:3])
-            step_pass.store(tip.jacobian + axis * tip.motors, follow, "q")
-            back.store(tip.twists + axis * tip.motors, twist[axis], "q")
-    else:
-        steps = [result.eliminated.steps(side, vector(turn), before[side]) for side, turn in enumerate(turn_loads)]
-        for place, turn, step in zip(plan.turns, turn_loads, steps, strict=True):
-            step_pass.store_all(place, (vector(turn) + result.twists @ step)[:3].tolist())
-        for axis, (nearer, step) in enumerate(zip(bend_loads, steps[1:], strict=True)):
-            step_pass.store_all(tip.tip_columns + axis * tip.unknowns - layout.unknown, step.tolist(), "q")
-            step_pass.store_all(tip.bends + 3 * axis, (vector(nearer) + result.motion.bends @ step).tolist())
-    return [one for part in (*turn_loads, *bend_loads, *before) for one in part or ()]
 
 
 def _common(rows: list[int], plan: Plan, block: Block, columns: TableColumns) -> TracedElement:

@@ -14,7 +14,7 @@ the three tip columns the derivative of the tip with respect to them: from `K X 
 
 from __future__ import annotations
 
-from softrobots.compiled.chain.elements import Load, vector
+from softrobots.compiled.chain.elements import Load, Motion, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import RecursionLayout, TipLayout
 from softrobots.compiled.chain.plan import Plan
@@ -49,22 +49,13 @@ def _start_inward_tip(tip: TipLayout) -> Block:
 
 def _finish(plan: Plan, tip: TipLayout) -> Block:
     """Add the sums beyond each motor, pass the leading motors, and turn all into world axes."""
-    unknowns, recursion = plan.unknowns, plan.recursion
     block = Block("finish_tip", "Compute the response to motors and constrained sums from the sums of the passes.")
-    axes = vector(block.loads(recursion.base, 9)).reshape(3, 3)
+    axes = vector(block.loads(plan.recursion.base, 9)).reshape(3, 3)
     total = vector(block.loads(tip.bends, 9)).reshape(3, 3)
-    leading = unknowns.leading(block)
-    motors = [motor for row in range(len(leading)) if (motor := unknowns.motor(row)) is not None]
-    loads = []
-    for place in (0, 3) if plan.weight else (0,):
-        force, lever = block.loads(recursion.force + place, 3), block.loads(recursion.lever + place, 3)
-        loads.append(Load(vector(force), vector(lever), 1.0))
     jacobian = {}
-    for element, outward_pass, motor in zip(leading[::-1], seen_backwards(leading)[::-1], motors[::-1], strict=True):
-        inward_pass = inward(element, outward_pass, loads, Outboard.tip(1), Balance())
-        loads = inward_pass.loads
-        jacobian[motor] = inward_pass.motion.moves[:, 0] + total @ inward_pass.motion.twists[:, 0]
-        block.store(tip.motor_torques + motor, inward_pass.motion.torque[0])
+    for motor, motion in leading_motors(plan, block):
+        jacobian[motor] = motion.moves[:, 0] + total @ motion.twists[:, 0]
+        block.store(tip.motor_torques + motor, motion.torque[0])
     for motor in set(range(tip.motors)) - set(jacobian):
         places = [axis * tip.motors + motor for axis in range(3)]
         known, twist = ([block.load(first + place) for place in places] for first in (tip.jacobian, tip.twists))
@@ -77,6 +68,22 @@ def _finish(plan: Plan, tip: TipLayout) -> Block:
         for axis, value in enumerate((axes @ column).tolist()):
             block.store(tip.constraint_columns + axis * tip.n_constraints + group, value)
     return block
+
+
+def leading_motors(plan: Plan, block: Block) -> list[tuple[int, Motion]]:
+    """Return number and motion of each leading motor, from the tip on; the loads are those behind the inward pass."""
+    unknowns, recursion = plan.unknowns, plan.recursion
+    leading, loads = unknowns.leading(block), []
+    motors = [motor for row in range(len(leading)) if (motor := unknowns.motor(row)) is not None]
+    for place in (0, 3) if plan.weight else (0,):
+        force, lever = block.loads(recursion.force + place, 3), block.loads(recursion.lever + place, 3)
+        loads.append(Load(vector(force), vector(lever), 1.0))
+    found = []
+    for element, outward_pass, motor in zip(leading[::-1], seen_backwards(leading)[::-1], motors[::-1], strict=True):
+        inward_pass = inward(element, outward_pass, loads, Outboard.tip(1), Balance())
+        loads = inward_pass.loads
+        found.append((motor, inward_pass.motion))
+    return found
 
 
 def _finish_column(recursion: RecursionLayout, tip: TipLayout) -> Block:

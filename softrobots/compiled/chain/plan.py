@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -11,7 +12,7 @@ from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
 from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.expressions import Expression
+from softrobots.compiled.trace.expressions import Expression, Scalar
 from softrobots.compiled.trace.numbers import NumberInputs
 from softrobots.model.serial_chain import SerialChain
 
@@ -27,7 +28,7 @@ class Plan:
     poses: bool = False
     """Whether targets of the tip are poses."""
     tip: TipLayout | None = None
-    """Places of the response of the tip, in code of looped chains that traces it."""
+    """Places of the response of the tip, or to given loads and motions, in code of looped chains that traces it."""
     inputs: NumberInputs | None = None
     """The numbers of the chain that are inputs of the code; None if all are constants."""
 
@@ -56,17 +57,21 @@ class Plan:
     @property
     def infix(self) -> str:
         """Part of the names of functions that tells those of the response of the tip from others."""
-        return "" if self.tip is None else "tip_"
+        return "" if self.tip is None or self.tip.given else "tip_"
 
     @property
     def columns(self) -> list[int]:
-        """Place of `s` of the elimination for each right-hand side: of the balance, and of the three of the tip."""
-        return _sides(self.recursion.column, None if self.tip is None else self.tip.column)
+        """Place of `s` of the elimination for each right-hand side: of the balance, and of those of the tip."""
+        return [self.recursion.column, *(() if self.tip is None else self.tip.each(self.tip.column, 6))]
 
     @property
     def turns(self) -> list[int]:
         """Place of the turn of all elements nearer to the base, and of the multipliers, for each right-hand side."""
-        return _sides(self.recursion.turn, None if self.tip is None else self.tip.turn)
+        return [self.recursion.turn, *(() if self.tip is None else self.tip.each(self.tip.turn, 6))]
+
+    def given_gaps(self, block: Block, sums: Sequence[int]) -> list[list[Scalar]]:
+        """Return the gaps of constrained sums in the right-hand side that is given; empty if there is none."""
+        return [[-block.load(self.tip.sums + one) for one in sums]] if self.tip is not None and self.tip.given else []
 
     def load_outboard(self, block: Block, n: int) -> tuple[Outboard, list[Expression]]:
         """Read the sums of the outboard elements, with `n` components; return them and the elements of matrix and columns."""
@@ -81,7 +86,3 @@ class Plan:
         block.store_all(self.recursion.matrix, [outboard.matrix[index] for index in upper_triangle(len(outboard.matrix))])
         for place, column in zip(self.columns, outboard.columns, strict=True):
             block.store_all(place, column.tolist())
-
-
-def _sides(first: int, others: int | None) -> list[int]:
-    return [first] if others is None else [first, *(others + 6 * axis for axis in range(3))]

@@ -143,6 +143,7 @@ def inward(
     balance: Balance,
     *,
     tip_columns: int = 0,
+    given: tuple[Any, Any] | None = None,
     pivot_shift: Scalar = 0.0,
 ) -> InwardPass:
     """Inward pass of an element.
@@ -154,6 +155,7 @@ def inward(
         beyond: Sums of the outboard elements.
         balance: Sums over elements, added to in place.
         tip_columns: Number of further right-hand sides, for the motion of the tip: none, 3 for its position, 6 with its turn.
+        given: Another right-hand side: a force on the tip, shape (3,), and loads on the unknown coordinates, (k,); None: none.
         pivot_shift: See `elimination.eliminate`.
 
     Returns:
@@ -207,6 +209,8 @@ def inward(
     for place, own in enumerate(element.stiffness):
         stiffness[place, place] = stiffness[place, place] + (own if law is None else law.stiffness)
     sides = [gradient, *(-np.concatenate([motion.moves, motion.twists])[:tip_columns]).tolist()]
+    if given is not None:
+        sides.append((-(given[0] @ motion.moves) - given[1]).tolist())
     eliminated, handed_on = eliminate(
         beyond,
         twists,

@@ -30,7 +30,8 @@ TARGET_SIZE: int
 N_ERRORS: int
 LANES: int
 LANE_SIZE: int
-NUMBER_WORKSPACE_SIZE: int
+NUMBER_WEIGHTS: int
+WORKSPACE_SIZE: int
 
 # Places in the workspace, see `softrobots.compiled.chain.layout`.
 ACTUATORS: int

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import TypeAlias
 
 from softrobots.compiled.chain.constrained_segments import segment_blocks
 from softrobots.compiled.chain.layout import Layout, TipLayout
 from softrobots.compiled.chain.looped_chain import Kind, element_kinds
+from softrobots.compiled.chain.looped_response import CONTROL as RESPONSE_CONTROL
+from softrobots.compiled.chain.looped_response import response_frame
 from softrobots.compiled.chain.looped_tip import CONTROL as TIP_CONTROL
 from softrobots.compiled.chain.looped_tip import tip_frame
 from softrobots.compiled.chain.plan import Plan
@@ -21,31 +24,32 @@ from softrobots.compiled.trace.blocks import Block
 
 @dataclass(frozen=True)
 class LoopedProgram:
-    """Parts of the code."""
+    """Parts of the code: of equilibria and the response of their tip, or of the response to given loads and motions."""
 
     blocks: list[Block]
-    """Straight-line functions that find equilibria."""
+    """Straight-line functions that find equilibria, or the response to given loads and motions."""
     tip_blocks: list[Block]
     """Straight-line functions of the response of the tip."""
     constants: dict[str, object]
     """Tables of numbers that differ between elements, places in the workspace, and the number of steps of a loop."""
     lane_size: int
-    """Size of the workspace that equilibria need."""
+    """Size of the workspace that those need."""
     size: int
     """Size of the workspace."""
     tip: TipLayout
-    """Places of the response of the tip in it."""
+    """Places of the response in it."""
     calls: dict[str, list[tuple[int, str]]]
     """By pass (`outward`, `inward`, `step`, and with `_tip` those of the response of the tip): kind of element and call."""
     route_loops: tuple[list[tuple[str, str]], list[tuple[str, str]]]
-    """Loops over actuators, text and name of the form of elements, of equilibria and of the response of the tip."""
+    """Loops over actuators, text and name of the form of elements, of equilibria and of the response of their tip."""
 
     def loops(self, suffix: str = "") -> str:
         """Return the functions that loop over the elements; those of batches end in "_lanes", without response of the tip."""
         passes = [name for name in self.calls if not suffix or name in _PASSES]
         routes = [loops_of(*loop, suffix) for loop in self.route_loops[0] + ([] if suffix else self.route_loops[1])]
-        texts = [*routes, *(self._loop(name, suffix) for name in passes), _CONTROL.replace("_SUFFIX", suffix)]
-        return "\n\n\n".join(texts if suffix else [*texts, TIP_CONTROL])
+        control = (RESPONSE_CONTROL if self.tip.given else _CONTROL).replace("_SUFFIX", suffix)
+        texts = [*routes, *(self._loop(name, suffix) for name in passes), control]
+        return "\n\n\n".join(texts if suffix or self.tip.given else [*texts, TIP_CONTROL])
 
     def _loop(self, name: str, suffix: str) -> str:
         back = name.startswith("inward")
@@ -76,6 +80,8 @@ def loop_text(
     return "\n".join([*lines, f"        i {'-' if back else '+'}= 1"])
 
 
+_Step: TypeAlias = "tuple[int, int, int, int, int]"
+_PREPARATION = ("prepare", "start_outward", "start_inward")
 _PASSES = {
     "outward": "Outward pass: axes.",
     "inward": "Inward pass: loads and elimination.",
@@ -112,7 +118,7 @@ def first_pass_SUFFIX(w: Array) -> None:
 
 def looped_program(plan: Plan) -> LoopedProgram:
     """Trace the functions that find equilibria of a looped chain, and those of the response of its tip."""
-    unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
+    unknowns, layout = plan.unknowns, plan.layout
     calls: dict[str, list[tuple[int, str]]] = {}
     kinds = element_kinds(plan)
     # Before the records stand the share of the step, the bounds of the loops, and the places of routes.
@@ -120,31 +126,56 @@ def looped_program(plan: Plan) -> LoopedProgram:
     tip = TipLayout(lane_size, layout.motors, layout.unknowns, unknowns.n_constraints)
     tip_plan = replace(plan, tip=tip)
     tip_blocks, tip_sequence, size = _sequence(tip_plan, element_kinds(tip_plan), tip.end, calls)
-    constants: dict[str, object] = {"FIRST": recursion.end + 1, "COUNT": recursion.end + 2, "N_ELEMENTS": len(sequence)}
-    constants |= tip.constants()
+    constants = _constants(plan, kinds, sequence) | tip.constants() | {"AT_TIP": tuple(at for _, at, *_ in tip_sequence)}
+    route_blocks, loops, tables = _along_routes(plan)
+    components, tip_loops = components_text(held=unknowns.held_lengths), []
+    for name, form in route_forms(plan).items():
+        tip_blocks += component_blocks(tip_plan, name, form)
+        tip_loops.append((components, f"tip_{name}"))
+    blocks = looped_frame(plan, len(sequence)) + blocks + route_blocks
+    tip_blocks = tip_frame(plan, tip) + tip_blocks
+    return LoopedProgram(blocks, tip_blocks, constants | tables, lane_size, size, tip, calls, (loops, tip_loops))
+
+
+def looped_response(plan: Plan) -> LoopedProgram:
+    """Trace the functions of the response of a looped chain to given loads and motions."""
+    tip = TipLayout(plan.routes.end, plan.layout.motors, plan.layout.unknowns, plan.unknowns.n_constraints, given=True)
+    plan = replace(plan, tip=tip)
+    calls: dict[str, list[tuple[int, str]]] = {}
+    kinds = element_kinds(plan)
+    blocks, sequence, size = _sequence(plan, kinds, tip.end, calls)
+    route_blocks, loops, tables = _along_routes(plan)
+    frame = [block for block in looped_frame(plan, len(sequence)) if block.name in _PREPARATION]
+    blocks = frame + response_frame(plan, tip) + blocks + route_blocks
+    return LoopedProgram(blocks, [], _constants(plan, kinds, sequence) | tables, size, size, tip, calls, (loops, []))
+
+
+def _constants(plan: Plan, kinds: Sequence[Kind], sequence: Sequence[_Step]) -> dict[str, object]:
+    """Return the tables of the elements, and the bounds of the loops."""
+    end = plan.recursion.end
+    constants: dict[str, object] = {"FIRST": end + 1, "COUNT": end + 2, "N_ELEMENTS": len(sequence)}
     constants |= {f"TABLE_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
     steps = dict(zip(("KIND", "AT", "ROW", "PLACE", "ELEMENT"), zip(*sequence, strict=True), strict=True))
-    constants |= {name: values for name, values in steps.items() if name != "ELEMENT" or unknowns.routed}
-    constants["AT_TIP"] = tuple(at for _, at, *_ in tip_sequence)
+    return constants | {name: values for name, values in steps.items() if name != "ELEMENT" or plan.unknowns.routed}
+
+
+def _along_routes(plan: Plan) -> tuple[list[Block], list[tuple[str, str]], dict[str, object]]:
+    """Return the straight-line functions, the loops and the tables of actuators on routes."""
+    blocks: list[Block] = []
     loops: list[tuple[str, str]] = []
-    tip_loops: list[tuple[str, str]] = []
+    tables: dict[str, object] = {}
     for name, form in route_forms(plan).items():
         added, columns = length_blocks(plan, name, form)
         blocks += added + component_blocks(plan, name, form)
-        tip_blocks += component_blocks(tip_plan, name, form)
-        components = components_text(held=unknowns.held_lengths)
-        loops += [(LENGTHS if columns else PULLS, name), (components, name)]
-        tip_loops.append((components, f"tip_{name}"))
+        loops += [(LENGTHS if columns else PULLS, name), (components_text(held=plan.unknowns.held_lengths), name)]
         if columns:
-            constants |= plan.routes.tables(columns.width) | {"POINT_TABLE": tuple(columns.numbers)}
-    blocks = looped_frame(plan, len(sequence)) + blocks
-    tip_blocks = tip_frame(plan, tip) + tip_blocks
-    return LoopedProgram(blocks, tip_blocks, constants, lane_size, size, tip, calls, (loops, tip_loops))
+            tables |= plan.routes.tables(columns.width) | {"POINT_TABLE": tuple(columns.numbers)}
+    return blocks, loops, tables
 
 
 def _sequence(
     plan: Plan, kinds: list[Kind], record: int, calls: dict[str, list[tuple[int, str]]]
-) -> tuple[list[Block], list[tuple[int, int, int, int, int]], int]:
+) -> tuple[list[Block], list[_Step], int]:
     """Put the elements in order, with the ends of segments with muscles between them.
 
     Args:
@@ -158,9 +189,9 @@ def _sequence(
         and the first place behind the records.
     """
     unknowns, layout, infix = plan.unknowns, plan.layout, plan.infix
-    suffix, at = ("", "AT[i]") if plan.tip is None else ("_tip", "AT_TIP[i]")
+    suffix, at = ("_tip", "AT_TIP[i]") if infix else ("", "AT[i]")
     outward_calls, inward_calls, step_calls = (calls.setdefault(name + suffix, []) for name in _PASSES)
-    steps: dict[int, tuple[int, int, int, int, int]] = {}  # by element
+    steps: dict[int, _Step] = {}  # by element
     forms = {form: name for name, form in route_forms(plan).items()}
     for kind in kinds:
         for place, row in enumerate(kind.rows):
@@ -181,7 +212,7 @@ def _sequence(
         sequence.insert(segment.last + 1 - leading, (end, 0, 0, 0, 0))
         if unknowns.routed:
             blocks += [start_lengths(plan, number, segment), leave_segment(plan, number)]
-            blocks += [keep_lengths(plan, number, segment)] if plan.tip is None else []
+            blocks += [] if infix else [keep_lengths(plan, number, segment)]
             outward_calls.append((end, f"keep_lengths_{number}(w)"))
             inward_calls.append((end, f"start_lengths_{infix}{number}(w)"))
             step_calls.append((end, f"leave_segment_{infix}{number}(w)"))

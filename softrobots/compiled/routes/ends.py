@@ -119,7 +119,8 @@ def held_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block],
             for one in segment.stretched
         ]
     whole = Outboard(matrix, columns, inner.min_pivot, inner.n_negative_pivots)
-    eliminated, beyond = eliminate_multipliers(whole, gaps, softness.tolist())
+    given = plan.given_gaps(eliminate, segment.stretched)
+    eliminated, beyond = eliminate_multipliers(whole, gaps, softness.tolist(), *given)
     plan.store_outboard(eliminate, beyond)
     eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, beyond.n_negative_pivots])
     solve = Block(f"solve_lengths_{plan.infix}{number}", "Find the tensions that hold given lengths.", ("at",), eliminate.trace)
@@ -143,9 +144,10 @@ def held_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block],
         solve.store(recursion.sums, energy)
         solve.store_all(recursion.steps, [slope, error])
     else:
-        for axis, column in enumerate(changes[1:]):
+        places = [tip.constraint_loads, *tip.each(tip.constraint_columns, tip.n_constraints)]
+        for place, column in zip(places, changes, strict=True):
             for muscle, value in zip(segment.stretched, column, strict=True):
-                solve.store(tip.constraint_columns + axis * tip.n_constraints + muscle, value)
+                solve.store(place + muscle, value)
     crossing = [*cross.ravel(), *square.ravel(), *(one for side in sums for one in side)]
     size = hoist([solve], eliminate, arriving, 0, "at", overwritten=[*state, *crossing])
     return [eliminate, solve], size

@@ -234,7 +234,7 @@ def component_blocks(plan: Plan, name: str, form: Form) -> list[Block]:
     before = Block(f"step_before{name}", "Add what steps nearer to the base do through a length.", ("to", "m"))
     after = Block(f"step_after{name}", "Add the steps of an element to a length.", ("at", "m", "q"))
     layout, tip = plan.layout, plan.tip
-    steps = [layout.step] if tip is None else [layout.step, *(tip.tip_columns + axis * tip.unknowns for axis in range(3))]
+    steps = [layout.step, *(() if tip is None else tip.each(tip.tip_columns, tip.unknowns))]
     for side, place in enumerate(steps):
         begin.store_all(routes.before + stride * side, [0.0] * k)
         add(

@@ -85,18 +85,26 @@ class Actuation:
 
         The multipliers are the loads beyond those of the start, see `looped_chain`.
         """
-        tip, chain = run.program.tip, self._chain
+        tip = run.program.tip
         joints = _rows(w, tip.motor_torques, self._count, 1)[0]
         if self._held:
             return np.concatenate([joints, _rows(w, run.layout.held, tip.n_constraints, 1)[0]])
         if self._lengths:
-            first = [self._strains.index(group[0]) for group in chain.constrained]
-            spread = _rows(w, run.layout.start, len(self._strains), 1)[0] - chain.rest[self._strains]
-            held = _rows(w, tip.constraint_loads, tip.n_constraints, 1)[0] - (chain.stiffness[self._strains] * spread)[first]
-            return np.concatenate([joints, held @ chain.constrained_slope])
+            start = _rows(w, run.layout.start, len(self._strains), 1)
+            return np.concatenate([joints, self._of_sums(start, _rows(w, tip.constraint_loads, tip.n_constraints, 1))[0]])
         if self._tensions:
             return np.concatenate([joints, self._pulled(run, w)[1].tension])
         return np.asarray(joints)
+
+    def held(self, motors: FloatArray, multipliers: FloatArray) -> FloatArray:
+        """Return the loads on muscles of given length, shape (n, n_muscles), from the multipliers of many cases, (n, h)."""
+        return multipliers if self._held else self._of_sums(self._starts(motors), multipliers)
+
+    def _of_sums(self, starts: FloatArray, multipliers: FloatArray) -> FloatArray:
+        chain = self._chain
+        first = [self._strains.index(group[0]) for group in chain.constrained]
+        at_start = (chain.stiffness[self._strains] * (starts - chain.rest[self._strains]))[:, first]
+        return np.asarray((multipliers - at_start) @ chain.constrained_slope)
 
     def rows(self, motors: FloatArray, layout: Layout) -> list[tuple[int, FloatArray]]:
         """Return places in the workspace and values of many cases: motor joints, loads of tensions, starts at the lengths."""

@@ -68,7 +68,7 @@ class Run:
         """Look up the functions; those that the program lacks are None."""
         self.program, self.layout = program, program.layout
         single, motion = ("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip"), ("motion_step", "motion_run")
-        batches = ("settle_batch", "estimate_batch", "reach_batch", "motion_batch", *RESPONSES)
+        batches = ("settle_batch", "estimate_batch", "reach_batch", "motion_batch", "respond_batch", *RESPONSES)
         for name in (*single, *motion, "place_at", *batches):
             setattr(self, name, getattr(functions, name, None))
 
@@ -107,6 +107,9 @@ class PythonRun(Run):
             self.motion_batch = MotionBatches(module, vectorised, program).motion_batch
             return
         batches = NumpyBatches(module, vectorised, program)
+        if hasattr(module, "respond"):
+            self.respond_batch = partial(batches.respond_batch, "respond")
+            return
         for name in ("settle_batch", "estimate_batch", "reach_batch"):
             setattr(self, name, getattr(batches, name))
         if program.responses is not None:

@@ -72,6 +72,11 @@ class CompiledStatics:
         """The back end: "numba" or "python"."""
         return self._backend
 
+    @property
+    def unknowns(self) -> Unknowns:
+        """Its chain and unknown strains."""
+        return self._unknowns
+
     def source(self, *, gravity: bool = False, lanes: bool = False, motion: bool = False) -> str:
         """Return the generated code as Python runs it.
 

@@ -29,7 +29,7 @@ class NumpyBatches:
         """Run the straight-line functions of a program on arrays by `vectorised`, and single cases by `module`."""
         self._module, self._vectorised = module, vectorised
         self._layout, self._size = program.layout, program.size
-        self._low, self._high = np.array(module.LOWER), np.array(module.UPPER)
+        self._low, self._high = (np.array(getattr(module, name, ())) for name in ("LOWER", "UPPER"))
 
     def settle_batch(self, *batch: Any) -> None:
         """Find equilibria; see `lane_drivers`."""

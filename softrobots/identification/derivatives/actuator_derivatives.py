@@ -12,7 +12,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.model.actuator_laws import ROUNDING
+from softrobots.model.actuator_laws import ROUNDING, ActuatorLaws
 from softrobots.model.numbers import LAW
 from softrobots.model.soft_model import SoftModel
 
@@ -82,6 +82,8 @@ class ActuatorStates:
         pulled = np.where(pulling, square * share**2 - least, 0.0)
         self.by_input = np.where(kinds == "tension", 1.0, 0.0) - elastic - pushes + pulled
         """Derivative of the tensions by the inputs, the same shape."""
+        self.pulls = ActuatorLaws(self._tags).at(beyond, inputs).tension
+        """The tensions, the same shape."""
         by_number = {
             "stiffness": np.where(taut, stretch, 0.0),
             "pretension": np.where(taut, 1.0, 0.0),

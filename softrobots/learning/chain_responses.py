@@ -1,0 +1,152 @@
+"""Derivatives of the equilibria of a looped chain by compiled code, in both modes, for many cases.
+
+Rates and weights of actuators along the body are those of what the code knows: of the sums that given lengths constrain, or of
+the loads on the strains by tensions. See `softrobots.compiled.chain.looped_response`.
+"""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from softrobots.compiled.program.given_program import make_given_program
+from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.backends import make_run
+from softrobots.compiled.run.batches import solve_batch
+from softrobots.compiled.run.compiled_model import CompiledModel
+from softrobots.compiled.run.responses import Cases
+from softrobots.compiled.settings import CHUNK
+from softrobots.core.checks import FloatArray
+from softrobots.identification.derivatives.actuator_derivatives import ActuatorStates
+from softrobots.identification.model_change import numbers_of
+from softrobots.identification.residual_derivatives import States
+
+
+class ChainEquilibria(NamedTuple):
+    """N equilibria of a chain."""
+
+    motors: FloatArray
+    """Actuators, shape (N, n_motors)."""
+    force: FloatArray
+    """Force on the tip, shape (N, 3) [N]."""
+    elastic: FloatArray
+    """Elastic coordinates, shape (N, n_springs) [rad or m]."""
+    strains: FloatArray
+    """Strains, shape (N, n_strains) [rad or m]."""
+    gravity: FloatArray
+    """Gravity, shape (3,) [m/s^2]."""
+
+
+class _Response(NamedTuple):
+    """Response of N cases to given rates."""
+
+    strains: FloatArray
+    """Rates of the strains, shape (N, n_strains); zero of locked ones."""
+    tip: FloatArray
+    """Rate of the tip, shape (N, 3)."""
+    motors: FloatArray
+    """Rates of the loads on motor joints, shape (N, n)."""
+    sums: FloatArray
+    """Rates of the loads on the sums that lengths constrain, shape (N, h)."""
+    held: FloatArray
+    """These loads themselves, beyond those of the start, shape (N, h)."""
+
+
+class Pulled(NamedTuple):
+    """Weights of the inputs of N cases."""
+
+    motors: FloatArray
+    """Weights of the actuators, shape (N, n_motors)."""
+    force: FloatArray
+    """Weights of the force, shape (N, 3)."""
+    strains: FloatArray
+    """Virtual rates of the strains, shape (N, n_strains); see `softrobots.identification.residual_derivatives`."""
+    tensions: FloatArray
+    """Loads on the actuators along the body in balance, shape (N, n_muscles)."""
+
+
+class ChainResponses:
+    """Code of a looped chain that has derivatives."""
+
+    def __init__(self, compiled: CompiledModel, *, weight: bool) -> None:
+        """Generate and load the code."""
+        self._model, self._unknowns, self._weight = compiled.model, compiled.unknowns, weight
+        self._chain, self._strains = self._unknowns.chain, list(self._unknowns.strains)
+        self._actuation = Actuation(self._model, self._unknowns)
+        self._run: Any = make_run(make_given_program(self._unknowns, weight=weight), compiled.backend)
+        self._slope = np.eye(self._unknowns.n_constraints) if self._unknowns.held_lengths else self._chain.constrained_slope
+
+    def at(self, cases: Cases, gravity: FloatArray, count: int) -> ChainEquilibria:
+        """Return the cases, N of them."""
+        motors, force, elastic = (
+            np.broadcast_to(one, (count, one.shape[1])) for one in (cases.motors, cases.force, cases.unknown)
+        )
+        if self._unknowns.held_lengths:
+            held: Any = self._model.structure.muscle_lengths
+            strains = held.strains_of_many(motors, elastic)
+        else:
+            strains = np.tile(self._chain.rest, (count, 1))
+            strains[:, self._strains] = self._actuation.of_elastic(motors, elastic)
+        return ChainEquilibria(motors, force, elastic, strains, gravity)
+
+    def states(self, at: ChainEquilibria, pulled: Pulled, rows: slice) -> States:
+        """Return some of the cases for the derivatives by parameters."""
+        loads = {self._model.tip: np.concatenate([at.force[rows], np.zeros_like(at.force[rows])], axis=1)}
+        if self._weight:
+            loads[""] = np.tile(at.gravity, (len(at.force[rows]), 1))
+        torques = np.concatenate([0.0 * at.motors[rows, : self._chain.n_motors], pulled.tensions[rows]], axis=1)
+        nothing = np.zeros(0)
+        return States(at.motors[rows], at.elastic[rows], loads, torques, nothing, nothing, at.strains[rows])
+
+    def pull(self, at: ChainEquilibria, springs: FloatArray, tips: FloatArray, threads: int) -> Pulled:
+        """Return weights of the inputs from those of elastic coordinates, shape (N, n_springs), and tips, (N, 3)."""
+        chain = self._chain
+        found = self._respond(at, springs @ chain.elastic, tips, None, None, threads)
+        along = tensions = np.zeros((len(at.motors), 0))
+        if self._unknowns.n_constraints:
+            along, tensions = found.sums @ self._slope, self._actuation.held(at.motors, found.held)
+        elif len(chain.actuators):
+            actuators = self._actuators(at)
+            along, tensions = -actuators.arms(found.strains[:, None])[:, 0] * actuators.by_input, actuators.pulls
+        return Pulled(np.concatenate([found.motors, along], axis=1), found.tip, found.strains, tensions)
+
+    def push(self, at: ChainEquilibria, motors: FloatArray, force: FloatArray, threads: int) -> list[FloatArray]:
+        """Return rates of elastic coordinates and tips from those of actuators, shape (N, n_motors), and force, (N, 3)."""
+        joints, along = motors[:, : self._chain.n_motors], motors[:, self._chain.n_motors :]
+        loads, sums = np.zeros((1, len(self._chain.stiffness))), None
+        if self._unknowns.n_constraints:
+            sums = along @ self._slope.T
+        elif len(self._chain.actuators):
+            actuators = self._actuators(at)
+            tensions, still = (along * actuators.by_input)[:, None], np.zeros((len(at.motors), 1, len(self._chain.stiffness)))
+            loads = -actuators.slopes(tensions, np.zeros_like(tensions), still)[0][:, 0]
+        found = self._respond(at, loads, force, joints, sums, threads)
+        return [found.strains @ self._chain.elastic.T, found.tip]
+
+    def _actuators(self, at: ChainEquilibria) -> ActuatorStates:
+        """Return the actuators along the body, without their tensions, which derivatives by their inputs do not need."""
+        inputs = at.motors[:, self._chain.n_motors :]
+        return ActuatorStates(self._model, numbers_of(self._model), at.strains, inputs, np.zeros_like(inputs))
+
+    def _respond(
+        self,
+        at: ChainEquilibria,
+        loads: FloatArray,
+        force: FloatArray,
+        joints: FloatArray | None,
+        sums: FloatArray | None,
+        threads: int,
+    ) -> _Response:
+        """Run the code; rates that are None are zero, as in a new workspace."""
+        layout, tip, count = self._run.layout, self._run.program.tip, len(at.motors)
+        inputs = [*self._actuation.rows(at.motors, layout), (layout.force, at.force), (layout.gravity, at.gravity[None])]
+        inputs += [(layout.unknown, at.strains[:, self._strains]), (tip.loads, loads[:, self._strains]), (tip.force, force)]
+        inputs += [(place, rates) for place, rates in ((tip.motions, joints), (tip.sums, sums)) if rates is not None]
+        results = [(tip.tip_columns, tip.unknowns), (tip.moved, 3), (tip.jacobian, tip.motors)]
+        results += [(place, tip.n_constraints) for place in (tip.constraint_columns, layout.held)]
+        nothing = np.zeros((count // CHUNK + 1, 0))
+        found, _ = solve_batch(self._run.respond_batch, inputs, results, count, threads, nothing)
+        strains = np.zeros((count, len(self._chain.stiffness)))
+        strains[:, self._strains] = found[0]
+        return _Response(strains, *found[1:])
