@@ -10,9 +10,10 @@ import pytest
 
 import softrobots as sr
 from softrobots.core.checks import FloatArray
+from softrobots.identification.derivatives.rows_and_states import Outputs, States
 from softrobots.identification.model_change import model_change
 from softrobots.identification.parameters import ParameterSet
-from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
+from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
 from tests.support.foreign import BRANCHED, SPRINGS
 
 FORCES = {"force": (0.0, 10.0, -11.0), "gravity": sr.EARTH_GRAVITY}

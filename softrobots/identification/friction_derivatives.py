@@ -17,9 +17,10 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.identification.derivatives.rows_and_states import Outputs
 from softrobots.identification.model_change import ModelChange
 from softrobots.identification.parameters import ParameterSet
-from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs
+from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
 from softrobots.model.dry_friction import BENDING_STICK, DryFriction
 
 _STEP = 1e-6  # of differences of a course, relative

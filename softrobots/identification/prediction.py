@@ -22,13 +22,14 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.core.vectors import cross
 from softrobots.identification.derivatives.row_vibration import VIBRATION, RowVibration
+from softrobots.identification.derivatives.rows_and_states import Outputs, States
 from softrobots.identification.friction_derivatives import friction_loads, slopes_of_course
 from softrobots.identification.measured_robot import frame_of, load_cases, loads_on
 from softrobots.identification.measurement_checks import difference
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
-from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
+from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
 from softrobots.model.friction_coordinates import after_step, memory_of, untouched
 from softrobots.model.numbers import LAW
 from softrobots.model.soft_model import SoftModel

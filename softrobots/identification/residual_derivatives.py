@@ -17,9 +17,8 @@ At a knee (the end of a plateau, a tendon that goes slack) they are the derivati
 from __future__ import annotations
 
 import contextlib
-from collections.abc import Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -28,59 +27,13 @@ from softrobots.core.checks import FloatArray
 from softrobots.identification.derivatives.actuator_derivatives import ActuatorStates
 from softrobots.identification.derivatives.contact_derivatives import ContactDerivatives
 from softrobots.identification.derivatives.loaded_tree import LoadedTree
+from softrobots.identification.derivatives.rows_and_states import Outputs, States
 from softrobots.identification.derivatives.spring_derivatives import SpringStates
 from softrobots.identification.model_change import ModelChange, numbers_of
 from softrobots.identification.parameters import ParameterSet
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
-from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.sensitivity import inverse_stiffness
-
-
-class States(NamedTuple):
-    """Equilibria of one robot, arrays with a row each."""
-
-    q_motors: FloatArray
-    """Actuators, shape (N, n_motors)."""
-    q_springs: FloatArray
-    """Elastic coordinates, shape (N, n_springs)."""
-    loads: Mapping[str, FloatArray]
-    """Wrench by frame, shape (N, 6), and gravity, by the name "", shape (N, 3), world axes."""
-    actuator_loads: FloatArray
-    """Load on each actuator, shape (N, n_motors)."""
-    tangent: FloatArray
-    """Tangent stiffness, shape (N, n_springs, n_springs)."""
-    coupling: FloatArray
-    """Derivative of the load on the elastic coordinates by the actuators, shape (N, n_springs, n_motors)."""
-    strains: FloatArray | None = None
-    """Strains, shape (N, n_strains), where they are known; tangent and coupling are not used where rows are."""
-
-    @classmethod
-    def of(cls, equilibria: Sequence[Equilibrium]) -> States:
-        """Stack equilibria of one robot."""
-        names = dict.fromkeys(name for one in equilibria for name in one.load.wrenches)
-        nothing: FloatArray = np.zeros(6)
-        loads = {name: np.array([one.load.wrenches.get(name, nothing) for one in equilibria]) for name in names}
-        if any(one.load.gravity is not None for one in equilibria):
-            loads[""] = np.array([one.load.gravity or (0.0, 0.0, 0.0) for one in equilibria])
-        fields = ("q_motors", "q_springs", "motor_torques", "tangent_stiffness", "coupling")
-        motors, springs, torques, tangent, coupling = (np.array([getattr(one, name) for one in equilibria]) for name in fields)
-        return cls(motors, springs, loads, torques, tangent, coupling)
-
-
-class Outputs(NamedTuple):
-    """Rows of outputs of each state; None where they do not depend on it."""
-
-    frame: str = ""
-    """Frame of which they are components of the pose."""
-    pose: FloatArray | None = None
-    """Weights of its position and rotation (world axes), shape (N, L, 6)."""
-    loads: FloatArray | None = None
-    """Weights of the loads on the actuators, shape (N, L, n_motors)."""
-    strains: FloatArray | None = None
-    """Weights of the strains, shape (N, L, n_strains): of the elastic coordinates, unless lengths of actuators are given."""
-    forces: FloatArray | None = None
-    """Weights of the normal forces of an equilibrium in contact, shape (1, L, k)."""
 
 
 class EquilibriumDerivatives:

@@ -15,11 +15,12 @@ from softrobots.core.summary import Part, Summarised, Table, short
 from softrobots.dynamics.vibration import VibrationModes
 from softrobots.identification.derivatives.contact_derivatives import ContactDerivatives
 from softrobots.identification.derivatives.frequency_derivatives import frequency_slopes
+from softrobots.identification.derivatives.rows_and_states import Outputs, States
 from softrobots.identification.friction_derivatives import friction_loads
 from softrobots.identification.model_change import present_change
 from softrobots.identification.parameter_names import LOADS
 from softrobots.identification.parameters import ParameterSet
-from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
+from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
 from softrobots.model.friction_coordinates import memory_of
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium, check_same_model

@@ -19,8 +19,8 @@ from softrobots.compiled.run.responses import Cases
 from softrobots.compiled.settings import CHUNK
 from softrobots.core.checks import FloatArray
 from softrobots.identification.derivatives.actuator_derivatives import ActuatorStates
+from softrobots.identification.derivatives.rows_and_states import States
 from softrobots.identification.model_change import numbers_of
-from softrobots.identification.residual_derivatives import States
 
 
 class ChainEquilibria(NamedTuple):

@@ -25,9 +25,10 @@ from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.run.responses import Cases
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
+from softrobots.identification.derivatives.rows_and_states import Outputs, States
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
-from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives, Outputs, States
+from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
 from softrobots.learning.chain_responses import ChainResponses
 from softrobots.learning.row_solver import RowSolver
 from softrobots.model.soft_model import SoftModel

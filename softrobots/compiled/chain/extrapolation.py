@@ -52,7 +52,8 @@ def beyond_history(layout: MotionLayout, block: Block, stage: int, coasting: Sca
 
 def compare_change(layout: MotionLayout, block: Block, moved: Sequence[Scalar]) -> None:
     """Let the changes of an unknown `i` in the middle, or at both stages, count for the largest of the correction."""
-    change, scale = block.load(layout.change), block.load(layout.scale, "i")
+    change: Scalar = block.load(layout.change)
+    scale = block.load(layout.scale, "i")
     for one in moved:
         size = absolute(one) * scale
         change = larger(change, if_less(size, 1e300, size, 1e300))  # also of NaN

@@ -174,12 +174,11 @@ class CompiledStatics:
             environment: Obstacles that the robot touches without friction, as in `equilibria`, from rest.
 
         Returns:
-            The equilibrium, `stable`, or neutral as `solve_equilibrium` finds it, too: `status` tells which. In contact a
-            `ContactEquilibrium`.
+            The equilibrium (in contact a `ContactEquilibrium`), `stable` or neutral as by `solve_equilibrium`: see `status`.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, or no shape of the robot has these muscle lengths; in
-                contact also if a start is given, and as `equilibria`.
+            ParameterError: If a shape differs, a number is not finite, no shape of the robot has these muscle lengths, a
+                start is given in contact, or as `equilibria`.
             EquilibriumNotFound: If no stable or neutral equilibrium is found; the error carries the best point.
         """
         if environment is not None:

@@ -12,10 +12,10 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError, SoftRobotsError
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.identification.derivatives.frequency_derivatives import mode_matrices, mode_slopes, moved
+from softrobots.identification.derivatives.rows_and_states import States
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import differences
 from softrobots.identification.parameters import OF_MODEL, ParameterSet
-from softrobots.identification.residual_derivatives import States
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticProblem
 from softrobots.statics.equilibrium import equilibrium_from_state
