@@ -238,8 +238,8 @@ class TipLayout:
         m, n, h, r = self.motors, self.unknowns, self.n_constraints, self.rows
         results = dict(jacobian=r * m, motor_torques=m, tip_columns=r * n, constraint_loads=h, constraint_columns=r * h)
         sums = dict(twists=3 * m, column=6 * r, turn=6 * r, bends=3 * r)
-        given = dict(moved=3, base_force=3, loads=n, force=3, motions=m, sums=h) if self.given else {}
-        assign_places(self, self.first, **results, **sums, **given, end=0)
+        given = dict(moved=3, base_force=3, loads=n, force=3, motions=m, sums=h)
+        assign_places(self, self.first, **results, **sums, **(given if self.given else dict.fromkeys(given, 0)), end=0)
 
     @property
     def rows(self) -> int:
