@@ -11,8 +11,8 @@ import pytest
 
 import softrobots as sr
 from softrobots.compiled import Status
-from softrobots.compiled.chain.motion_groups import motion_groups
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.motion.motion_groups import motion_groups
 from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.dynamics.equations import EquationsOfMotion

@@ -69,7 +69,7 @@ TORQUES: int
 TURNED: int
 UNKNOWN: int
 
-# Places in the workspace of motion, see `softrobots.compiled.chain.motion_layout`.
+# Places in the workspace of motion, see `softrobots.compiled.motion.motion_layout`.
 ACCELERATION: int
 BEGIN_POSITION: int
 BEGIN_VELOCITY: int

@@ -1,7 +1,7 @@
 """Steps of time by the implicit midpoint rule or of fourth order, and runs of many.
 
 Functions in the kernel language, see `softrobots.compiled.drivers.equilibrium_drivers`; the equations of a step are in
-`softrobots.compiled.chain.time_step` and `softrobots.compiled.program.motion_parts`.
+`softrobots.compiled.motion.time_step` and `softrobots.compiled.program.motion_parts`.
 """
 
 from __future__ import annotations

@@ -7,12 +7,12 @@ from dataclasses import replace
 import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, vector
-from softrobots.compiled.chain.gauss_step import keep_block, placing_blocks
-from softrobots.compiled.chain.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
-from softrobots.compiled.chain.motion_groups import motion_groups, reach_behind
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.moving_joints import MovingFrame, joint_state, moved
 from softrobots.compiled.chain.unrolled_chain import place_base
+from softrobots.compiled.motion.gauss_step import keep_block, placing_blocks
+from softrobots.compiled.motion.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
+from softrobots.compiled.motion.motion_groups import motion_groups, reach_behind
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.moving_joints import MovingFrame, joint_state, moved
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_actuators import actuator_parts
 from softrobots.compiled.program.motion_parts import MotionParts

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.motion_routes import MotionRoutes
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.routes.ends import keep_lengths
 from softrobots.compiled.routes.loops import LENGTHS, PULLS, loops_of

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from softrobots.compiled.chain.gauss_step import corrections, right_hand_side, stage_values
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.unrolled_motion import (
+from softrobots.compiled.motion.gauss_step import corrections, right_hand_side, stage_values
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.unrolled_motion import (
     State,
     factored,
     joints_of,

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from softrobots.compiled import motion_settings
-from softrobots.compiled.chain.held_motion import in_motion
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.time_step import step_blocks
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import motion_drivers, motion_lane_drivers
 from softrobots.compiled.drivers.lane_drivers import load_block, load_case
+from softrobots.compiled.motion.held_motion import in_motion
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.time_step import step_blocks
 from softrobots.compiled.program.generated_module import Program, functions_of, lane_count, lane_text, module_text
 from softrobots.compiled.program.looped_motion_program import looped_motion
 from softrobots.compiled.program.manual import Place, inputs_of, motor_names, on_a_line, place_table, strain_names

@@ -1,9 +1,9 @@
-"""The border of the matrix of a step, traced and in loops; see `softrobots.compiled.chain.motion_routes`."""
+"""The border of the matrix of a step, traced and in loops; see `softrobots.compiled.motion.motion_routes`."""
 
 from __future__ import annotations
 
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.motion_routes import MotionRoutes
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.complex_numbers import ComplexScalar, parts_of
 from softrobots.compiled.trace.expressions import Scalar

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from softrobots.compiled.chain.elements import upper_triangle
-from softrobots.compiled.chain.motion_groups import OUT_OF_RANGE
-from softrobots.compiled.chain.motion_routes import MotionRoutes
 from softrobots.compiled.chain.unknowns import Segment
+from softrobots.compiled.motion.motion_groups import OUT_OF_RANGE
+from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.routes.ends import tension
 from softrobots.compiled.routes.terms import Form
 from softrobots.compiled.trace.blocks import Block

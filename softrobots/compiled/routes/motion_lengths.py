@@ -1,10 +1,10 @@
-"""Given lengths in motion, traced and in loops: the strains that have them; see `softrobots.compiled.chain.held_motion`."""
+"""Given lengths in motion, traced and in loops: the strains that have them; see `softrobots.compiled.motion.held_motion`."""
 
 from __future__ import annotations
 
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.motion_routes import MotionRoutes, sparse
 from softrobots.compiled.chain.unknowns import Segment
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.motion_routes import MotionRoutes, sparse
 from softrobots.compiled.routes.motion_border import factor_blocks
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import absolute, smaller

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.chain.held_motion import moving_coordinates
+from softrobots.compiled.motion.held_motion import moving_coordinates
 from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector

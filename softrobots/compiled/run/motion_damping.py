@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from softrobots.compiled.chain.motion_layout import MotionLayout
+from softrobots.compiled.motion.motion_layout import MotionLayout
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.damping import damping_matrix, strain_damping
 from softrobots.model.soft_model import SoftModel

@@ -5,10 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass, field
 from functools import cached_property
 
-from softrobots.compiled.chain.held_motion import moving_coordinates
 from softrobots.compiled.chain.layout import assign_places
-from softrobots.compiled.chain.motion_routes import MotionRoutes
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.motion.held_motion import moving_coordinates
+from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.motion_settings import KEPT_DIFFERENCES
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.complex_numbers import ComplexScalar

@@ -1,7 +1,7 @@
 """Code of the motion of a looped chain: functions for each kind of group of elements, called in loops over the groups.
 
 Four passes, each a loop: outward with the motion of the bodies, inward with the factors
-(`softrobots.compiled.chain.articulated`), inward with the residual, outward with the correction. Numbers in which groups of a
+(`softrobots.compiled.motion.articulated`), inward with the residual, outward with the correction. Numbers in which groups of a
 kind differ stand in a table; values for a later pass in the record of the group in the workspace.
 """
 
@@ -13,7 +13,11 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.articulated import (
+from softrobots.compiled.chain.elements import Screw, Vector, constants, symmetric, turned, upper_triangle, vector
+from softrobots.compiled.chain.elimination import Eliminated
+from softrobots.compiled.chain.layout import assign_places
+from softrobots.compiled.chain.looped_chain import Kind
+from softrobots.compiled.motion.articulated import (
     ArticulatedGroup,
     JointLine,
     Pull,
@@ -22,14 +26,10 @@ from softrobots.compiled.chain.articulated import (
     carried_outward,
     moved_wrench,
 )
-from softrobots.compiled.chain.elements import Screw, Vector, constants, symmetric, turned, upper_triangle, vector
-from softrobots.compiled.chain.elimination import Eliminated
-from softrobots.compiled.chain.gauss_step import corrections, right_hand_side
-from softrobots.compiled.chain.layout import assign_places
-from softrobots.compiled.chain.looped_chain import Kind
-from softrobots.compiled.chain.motion_groups import ElementParts, MovingGroup, group_signature, motion_groups, moving_parts
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.moving_joints import MovingFrame, moved, wrench
+from softrobots.compiled.motion.gauss_step import corrections, right_hand_side
+from softrobots.compiled.motion.motion_groups import ElementParts, MovingGroup, group_signature, motion_groups, moving_parts
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.complex_numbers import ComplexScalar, of_parts, parts_of
 from softrobots.compiled.trace.expressions import Expression, Scalar

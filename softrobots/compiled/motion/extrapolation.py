@@ -12,7 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from softrobots.compiled.chain.motion_layout import MotionLayout
+from softrobots.compiled.motion.motion_layout import MotionLayout
 from softrobots.compiled.motion_settings import KEPT_DIFFERENCES
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger

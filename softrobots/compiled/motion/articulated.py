@@ -23,7 +23,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, cross, outer, skew, symmetric, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate
-from softrobots.compiled.chain.moving_joints import RigidBody
+from softrobots.compiled.motion.moving_joints import RigidBody
 from softrobots.compiled.trace.expressions import Scalar
 
 

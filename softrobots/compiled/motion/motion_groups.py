@@ -11,11 +11,11 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.looped_chain import element_signature, table_element
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.moving_joints import CompositeBody, JointState, RigidBody, SectionState, joint_state, round_part
 from softrobots.compiled.chain.muscle_terms import pulls_on
 from softrobots.compiled.chain.recursion import TracedElement, range_margin
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.moving_joints import CompositeBody, JointState, RigidBody, SectionState, joint_state, round_part
 from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.expressions import Scalar, if_less
 from softrobots.core.checks import FloatArray

@@ -10,9 +10,9 @@ Motors move along the parabola through their positions at the beginning, in the 
 
 from __future__ import annotations
 
-from softrobots.compiled.chain.extrapolation import beyond_history, choose_order, compare_change, keep_history
-from softrobots.compiled.chain.gauss_step import gauss_blocks
-from softrobots.compiled.chain.motion_layout import MotionLayout
+from softrobots.compiled.motion.extrapolation import beyond_history, choose_order, compare_change, keep_history
+from softrobots.compiled.motion.gauss_step import gauss_blocks
+from softrobots.compiled.motion.motion_layout import MotionLayout
 from softrobots.compiled.motion_settings import MOTION_ROUNDING, MOTION_TOLERANCE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, if_less, larger

@@ -20,10 +20,10 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, cross, turned, vector
-from softrobots.compiled.chain.motion_layout import MotionPlan
-from softrobots.compiled.chain.moving_joints import CompositeBody
 from softrobots.compiled.chain.recursion import TracedElement
 from softrobots.compiled.chain.slack_hinges import with_slack_hinges
+from softrobots.compiled.motion.motion_layout import MotionPlan
+from softrobots.compiled.motion.moving_joints import CompositeBody
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.model.serial_chain import bodies_of

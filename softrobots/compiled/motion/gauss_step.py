@@ -1,6 +1,6 @@
 r"""Steps of fourth order, traced: the method of Gauss with two stages, see `softrobots.dynamics.gauss`.
 
-The functions have the names and the work of those of the midpoint rule in `softrobots.compiled.chain.time_step`, so that the
+The functions have the names and the work of those of the midpoint rule in `softrobots.compiled.motion.time_step`, so that the
 drivers are the same. Each has both stages of an unknown; the residuals of both make one complex right-hand side.
 """
 
@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from softrobots.compiled.chain.extrapolation import beyond_history, compare_change, keep_history
-from softrobots.compiled.chain.motion_layout import MotionLayout
+from softrobots.compiled.motion.extrapolation import beyond_history, compare_change, keep_history
+from softrobots.compiled.motion.motion_layout import MotionLayout
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.complex_numbers import ComplexScalar, parts_of
 from softrobots.compiled.trace.expressions import Scalar

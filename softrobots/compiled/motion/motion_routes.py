@@ -19,10 +19,10 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.chain.held_motion import HeldMotion, held_motion
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.motion.held_motion import HeldMotion, held_motion
 
 
 @dataclass(frozen=True)
