@@ -177,15 +177,14 @@ class CompiledStatics:
             The equilibrium (in contact a `ContactEquilibrium`), `stable` or neutral as by `solve_equilibrium`: see `status`.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, no shape of the robot has these muscle lengths, a
-                start is given in contact, or as `equilibria`.
+            ParameterError: If an argument is refused, no shape has these muscle lengths, or a start is given in contact.
             EquilibriumNotFound: If no stable or neutral equilibrium is found; the error carries the best point.
         """
         if environment is not None:
             if q_springs0 is not None:
                 raise ParameterError("q_springs0", q_springs0, "None in contact: the search starts from rest")
-            given = q_motors, force, gravity, environment
-            return certified(self._solver_in_contact().equilibrium(self._actuation, self._run(False), *given))
+            solve = self._solver_in_contact().equilibrium
+            return certified(solve(self._actuation, self._run(False), q_motors, force, gravity, environment))
         if (
             self._plain
             and q_springs0 is None
