@@ -290,8 +290,7 @@ def sensitivity(
         parameters = _named(model, model.robot is not None, names)
     elif parameters.present != model:
         raise ParameterError("parameters", parameters.present, f"those of the model given, {model!r}")
-    found = Sensitivity(at, parameters, estimate)
-    found.check()
+    (found := Sensitivity(at, parameters, estimate)).check()
     return found
 
 
