@@ -11,9 +11,9 @@ import softrobots as sr
 from softrobots.compiled.run.responses import Cases
 from softrobots.learning.chain_responses import ChainResponses
 from softrobots.learning.differentiable import Differentiable
+from tests.support.learning_cases import CASES, OPTIONS, changes
+from tests.support.routed_robots import ROBOTS as ROUTED
 from tests.support.serial_chains import ROBOTS
-from tests.test_compiled_actuators import ROBOTS as ROUTED
-from tests.test_learning_general import CASES, OPTIONS, changes
 
 ALONE = ("given lengths", "tensions", "tendons", "winding lengths", "helix")
 QUICK = ("given lengths", "tendons")

@@ -19,26 +19,11 @@ from softrobots.compiled.run.looped_search import LoopedSearch
 from tests.support.c_libraries import Controller
 from tests.support.oracles import central_difference
 from tests.support.routed_arms import actuator, curve_length, routed
+from tests.support.routed_robots import ROBOTS
 from tests.support.screw_motions import screw_matrix
 from tests.support.serial_chains import ARM, LAWS, LENGTHS, ROUTES
-from tests.support.serial_chains import ROBOTS as SERIAL_CHAINS
 
 GRAVITY = np.array([0.4, -1.0, -9.7])  # [m/s^2]
-ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
-    "tendons": SERIAL_CHAINS["tendons"],
-    "winding": SERIAL_CHAINS["winding"],
-    "by_segment": lambda: sr.load_model(sr.PccArm(**ARM, kind=("tension", "pressure"))),
-    "lumped": lambda: sr.load_model(
-        sr.PccArm(segment_lengths=LENGTHS, chain="lumped", hinges=1, kind=("mckibben", "elastic"), routing="base")
-    ),
-    "lengths_on_an_arm": lambda: sr.load_model(
-        sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(**ARM, kind="length", routing="base"))
-    ),
-    "winding_lengths": SERIAL_CHAINS["coils"],
-    "on_an_arm": lambda: sr.load_model(
-        sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(**ARM, kind="elastic", routing="base"))
-    ),
-}
 
 
 @cache
