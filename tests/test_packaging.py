@@ -110,7 +110,7 @@ ROOMS = {
     " compiled export view",
 }
 """Every folder of the package, and the rooms that it may import."""
-TO_CODE = ("trace", "chain", "routes", "drivers", "program", "translate", "browser", "contact", "run", "sweeps")
+TO_CODE = ("trace", "chain", "motion", "routes", "drivers", "program", "translate", "browser", "contact", "run", "sweeps")
 """Folders of `compiled/` in the order in which a robot becomes code; each imports only those before it."""
 SOLVERS = "trajectory load_estimation imposed_displacement buckling.critical_load stability workspace buckling.post_buckling"
 SOLVERS += " sensitivity"
