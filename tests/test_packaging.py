@@ -135,7 +135,7 @@ COMPARING = {"softrobots.description.collision_shapes", "softrobots.cli.tools.ki
 """Modules that read a file with Pinocchio as other tools do, to compare it or look at its shapes."""
 WITH_PINOCCHIO = {
     f"softrobots.description.{name}" for name in ("rigid_tree", "rigid_tree_urdf", "composition", "collision_shapes")
-} | {"softrobots.robots.placed_robot"}
+}
 """Below `model` only these, which read and write foreign files, import Pinocchio."""
 
 

@@ -279,9 +279,8 @@ def sensitivity(
         check_no_contact(at, "a derivative of an estimate")
     friction = model.structure.friction
     if at.contacts and (friction is not None or model.structure.muscle_lengths is not None):
-        raise ParameterError(
-            "equilibrium", list(at.contacts), "one without, for a robot with dry friction or given muscle lengths"
-        )
+        required = "one without contacts, of a robot with dry friction or given muscle lengths"
+        raise ParameterError("equilibrium", list(at.contacts), required)
     if friction is not None and (friction.guided or model.structure.muscle_lengths is not None):
         requirement = "a robot without friction of guides, and without friction of segments whose muscle lengths are given"
         raise ParameterError("model", model.pinocchio.name, f"{requirement}, for derivatives by parameters")
@@ -290,7 +289,8 @@ def sensitivity(
         parameters = _named(model, model.robot is not None, names)
     elif parameters.present != model:
         raise ParameterError("parameters", parameters.present, f"those of the model given, {model!r}")
-    (found := Sensitivity(at, parameters, estimate)).check()
+    found = Sensitivity(at, parameters, estimate)
+    found.check()
     return found
 
 

@@ -95,7 +95,7 @@ class ChainResponses:
         loads = {self._model.tip: np.concatenate([at.force[rows], np.zeros_like(at.force[rows])], axis=1)}
         if self._weight:
             loads[""] = np.tile(at.gravity, (len(at.force[rows]), 1))
-        torques = np.concatenate([0.0 * at.motors[rows, : self._chain.n_motors], pulled.tensions[rows]], axis=1)
+        torques = np.pad(pulled.tensions[rows], ((0, 0), (self._chain.n_motors, 0)))
         nothing = np.zeros(0)
         return States(at.motors[rows], at.elastic[rows], loads, torques, nothing, nothing, at.strains[rows])
 

@@ -17,12 +17,10 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 from xml.dom import minidom
 
-import pinocchio as pin
-
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.description.composition import mount
-from softrobots.description.rigid_tree import number_text
+from softrobots.description.rigid_tree import Placement, number_text
 from softrobots.description.sources import Robot
 from softrobots.robots.parameter_file import read_parameters, robot_of
 
@@ -110,7 +108,7 @@ class RobotPlacement:
                 joint.appendChild(dom.createElement(tag)).setAttribute(attribute, value)
             root.appendChild(link)
             root.appendChild(joint)
-        angles = pin.rpy.matrixToRpy(pin.exp3(finite_array("base_rotation", self.rotation, (3,), "rad")))
+        angles = Placement.moved("revolute", finite_array("base_rotation", self.rotation, (3,), "rad"), 1.0).rpy
         base = f'<robot name="{MEASURED}"><link name="{MEASURED}"/></robot>'
         name = root.getAttribute("name")
         return mount(base, MEASURED, dom.toxml(), prefix="", xyz=self.position, rpy=angles, name=name)

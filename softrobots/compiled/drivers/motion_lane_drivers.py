@@ -25,17 +25,17 @@ def lanes_to_settle(w: Array) -> float:
     judge_corrections_lanes(w)
     count = 0.0
     for lane in range(LANES):
-        w[LAST_CHANGE * LANES + lane] = w[CHANGE * LANES + lane]
         count += (1.0 - w[SETTLED * LANES + lane]) * (1.0 - w[FAILED * LANES + lane])
     return count
 
 
 def slow_lanes(w: Array) -> float:
-    """Return the number of lanes whose corrections shrink slowly, without those that have failed before."""
+    """Return the number of the lanes to settle whose corrections shrink slowly; their change becomes the last one."""
     count = 0.0
     for lane in range(LANES):
-        slow = where(w[CHANGE * LANES + lane] > RENEW_SHARE * w[LAST_CHANGE * LANES + lane], 1.0, 0.0)
-        count += slow * (1.0 - w[FAILED * LANES + lane])
+        left = (1.0 - w[SETTLED * LANES + lane]) * (1.0 - w[FAILED * LANES + lane])
+        count += where(w[CHANGE * LANES + lane] > RENEW_SHARE * w[LAST_CHANGE * LANES + lane], left, 0.0)
+        w[LAST_CHANGE * LANES + lane] = w[CHANGE * LANES + lane]
     return count
 
 
@@ -54,9 +54,9 @@ def settle_middle_lanes(w: Array, n_history: int) -> None:
         fill_lanes(w, CHANGE, 0.0)
         for i in range(N):
             apply_correction_lanes(w, i)
-        slow = slow_lanes(w)
         if lanes_to_settle(w) < 0.5:
             break
+        slow = slow_lanes(w)
     for lane in range(LANES):
         w[FAILED * LANES + lane] = where(w[SETTLED * LANES + lane] < 0.5, 1.0, w[FAILED * LANES + lane])
 

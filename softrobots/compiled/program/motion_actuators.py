@@ -21,6 +21,9 @@ _PASSES = {
     "pull": "Find the tensions of the actuators and their torques, from tip to base.",
     "swerve": "Find the accelerations of the lengths at constant rates.",
 }
+_NO_SWERVE = '''def swerve_FORM(w: Array, element: int, q: int) -> None:
+    """Add nothing for an element without actuators beside it."""
+    pass'''
 
 
 @dataclass(frozen=True)
@@ -40,9 +43,8 @@ class ActuatorParts:
 
     def loops(self, suffix: str) -> list[str]:
         """Return the functions that loop over elements before those of the chain, for one case or for lanes."""
-        back = {"pull"}
         passes = [
-            loop_text(f"{name}", _PASSES[name], calls, back=name in back, suffix=suffix, prefix="ROUTE_")
+            loop_text(name, _PASSES[name], calls, back=name == "pull", suffix=suffix, prefix="ROUTE_")
             for name, calls in self.calls.items()
         ]
         forms = [loops_of(text, form, suffix).replace("_SUFFIX", suffix) for text, form in self.before]
@@ -108,8 +110,3 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
         after = factors_text("closing") + HELD.replace("MASSIVE", massive)
     after += factors_text("system") + BORDER
     return ActuatorParts([*blocks, *border_blocks(plan, routes)], tables, before, calls, after)
-
-
-_NO_SWERVE = '''def swerve_FORM(w: Array, element: int, q: int) -> None:
-    """Add nothing for an element without actuators beside it."""
-    pass'''

@@ -177,7 +177,7 @@ class CompiledStatics:
             The equilibrium (in contact a `ContactEquilibrium`), `stable` or neutral as by `solve_equilibrium`: see `status`.
 
         Raises:
-            ParameterError: If an argument is refused, no shape has these muscle lengths, or a start is given in contact.
+            ParameterError: If a shape differs, a number is not finite, no shape has these muscle lengths, or as `equilibria`.
             EquilibriumNotFound: If no stable or neutral equilibrium is found; the error carries the best point.
         """
         if environment is not None:

@@ -201,7 +201,7 @@ class MotionBatches:
             settled = w[layout.settled] > 0.5
             if np.all(settled | failed):
                 break
-            slow = bool(np.any((w[layout.change] > self._alone.RENEW_SHARE * w[layout.last_change]) & ~failed))
+            slow = bool(np.any((w[layout.change] > self._alone.RENEW_SHARE * w[layout.last_change]) & ~settled & ~failed))
             w[layout.last_change] = w[layout.change]
         for i in range(layout.unknowns):
             functions.finish_unknown(w, i)

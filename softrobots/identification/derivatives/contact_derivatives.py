@@ -14,6 +14,7 @@ a model are (`softrobots.identification.model_change`).
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
 from functools import lru_cache, partial
 from typing import Any
@@ -28,6 +29,7 @@ from softrobots.identification.model_change import differences
 from softrobots.identification.parameters import ParameterSet
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.certificate import active_contacts
+from softrobots.statics.contact.contact import Contact
 from softrobots.statics.contact.pressed_gaps import check_no_rubbing, motor_slopes
 from softrobots.statics.contact.touch import NEAR, NO_FORCES, NearSurfaces
 from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
@@ -48,10 +50,10 @@ class ContactDerivatives:
             NeutralEquilibrium: If the stiffness beside the contacts is singular.
         """
         check_no_rubbing(equilibrium, "a derivative by parameters")
-        touching = [f"{one.link} on {one.obstacle}" for one in equilibrium.contacts if not one.strict]
+        touching = [one for one in equilibrium.contacts if not one.strict]
         if touching:
             requirement = "one whose contacts are pressed: without force one opens or presses, so that there is no derivative"
-            raise ParameterError("equilibrium", touching, requirement)
+            raise ParameterError("equilibrium", _named(touching), requirement)
         self._equilibrium, model = equilibrium, equilibrium.model
         self._environment = check_environment(equilibrium.environment)
         state: Any = elastic_state(model, equilibrium.q_motors, equilibrium.q_springs, equilibrium.load)
@@ -63,8 +65,8 @@ class ContactDerivatives:
         """Derivatives of the pressed gaps by the actuators, shape (k, n_motors)."""
         sizes = np.linalg.svd(rows / np.sqrt(model.stiffness), compute_uv=False)
         if len(sizes) < len(rows) or sizes[-1] <= _INDEPENDENT * sizes[0]:
-            told = [f"{one.link} on {one.obstacle}" for one in equilibrium.contacts]
-            raise ParameterError("equilibrium", told, "one whose contacts hold different motions: here forces are not unique")
+            requirement = "one whose contacts hold different motions: here forces are not unique"
+            raise ParameterError("equilibrium", _named(equilibrium.contacts), requirement)
         self._inverse = inverse_in_contact(model, state.tangent, rows)
         whole = motor_slopes(state, equilibrium.load)
         free = motor_slopes(state._replace(touch=None), equilibrium.load)
@@ -137,6 +139,10 @@ class ContactDerivatives:
             "springs": self._forces @ touch.rows[places],
             "motors": self._forces @ touch.motor_rows[places],
         }
+
+
+def _named(contacts: Iterable[Contact]) -> list[str]:
+    return [f"{one.link} on {one.obstacle}" for one in contacts]
 
 
 @lru_cache(maxsize=256)
