@@ -32,7 +32,8 @@ FOURTH_ORDER_STEPS = (15e-3, 10e-3, 5e-3, 2.5e-3)
 _STEPS = (10e-3, 5e-3, 4e-3, 2.5e-3, 2e-3, 1.25e-3, 1e-3, 0.5e-3, 0.25e-3)  # tried for rods, the longest first [s]
 _LENGTH, _RADIUS, _YOUNG, _DENSITY, _PUSH = 0.4, 5e-3, 70e6, 1200.0, 0.1  # of a rod of TPU, SI units
 _DAMPING = 1e-3  # [s]: 0.7 % of critical damping in the first mode
-_ROW = 0.02  # [s]
+_ROW = 0.02  # of rods [s]
+_ARM_ROW = 0.1  # [s]: steps of MuJoCo divide it, so that there are steps of nearly every length
 _SHORT = 25  # rows of the comparison with MuJoCo, which is slow
 
 
@@ -102,10 +103,10 @@ def reference(duration: float, rows: int) -> FloatArray:
 
 
 def _arm(settings: Settings) -> Outcome:
-    """The inflatable arm of three motors and four springs, let go; MuJoCo is tuned for the error of each of our steps."""
+    """The inflatable arm of three motors and four springs, let go for ten seconds; MuJoCo is tuned for the error of our steps."""
     model, motors = arm(), (0.3, 0.6, -0.8)
     start = solve_equilibrium(model, motors, force=(0.0, 10.0, -15.0), gravity=EARTH_GRAVITY)
-    released = Released(start, EARTH_GRAVITY, 1e-3, _ROW, 5 if settings.quick else 100)
+    released = Released(start, EARTH_GRAVITY, 1e-3, _ARM_ROW, 5 if settings.quick else 100)
     solver, general = compiled(model, "numba"), partial(simulate, model, released.duration, motors)
     finest = _run(general, released, ARM_STEP, order=4)().tip_position
     rows, notes = [], []
