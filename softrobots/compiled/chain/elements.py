@@ -112,7 +112,11 @@ def symmetric(values: Sequence[Scalar], n: int) -> Vector:
 
 def turned(axes: Vector, angle: Scalar) -> Vector:
     """Return axes turned about their own z."""
-    c, s = cosine(angle), sine(angle)
+    return turned_by(axes, cosine(angle), sine(angle))
+
+
+def turned_by(axes: Vector, c: Scalar, s: Scalar) -> Vector:
+    """Return axes turned about their own z by the angle of a cosine and a sine."""
     x, y, z = axes.T
     return np.array([x * c + y * s, y * c - x * s, z], dtype=object).T
 

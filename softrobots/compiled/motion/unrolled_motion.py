@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Vector, constants, cross, turned, vector
+from softrobots.compiled.chain.elements import Vector, constants, cross, turned, turned_by, vector
 from softrobots.compiled.chain.recursion import TracedElement
 from softrobots.compiled.chain.slack_hinges import with_slack_hinges
 from softrobots.compiled.motion.motion_layout import MotionPlan
@@ -31,7 +31,7 @@ from softrobots.model.serial_chain import bodies_of
 _UP = constants([0.0, 0.0, 1.0])
 
 
-class _Joint(NamedTuple):
+class Joint(NamedTuple):
     """An element at its coordinate."""
 
     element: TracedElement
@@ -59,21 +59,24 @@ def state_of(plan: MotionPlan, block: Block) -> State:
     return [block.loads(place, layout.unknowns) for place in (layout.unknown, layout.rate, layout.acceleration)]
 
 
-def joints_of(plan: MotionPlan, block: Block, state: State) -> list[_Joint]:
-    """Return the elements at the motors of the workspace and the unknowns of a state."""
+def joints_of(plan: MotionPlan, block: Block, state: State, bends: Sequence[tuple[Scalar, Scalar]] = ()) -> list[Joint]:
+    """Return the elements at the motors of the workspace and the unknowns of a state; `bends`: their cosines and sines."""
     unknowns = plan.unknowns
     rows = range(len(unknowns.chain.elements))
     traced = [unknowns.traced(row, block.load, lambda place: state[0][place]) for row in rows]
     joints = []
-    for element, given in zip(with_slack_hinges(unknowns, traced, unknowns.chain), unknowns.chain.elements, strict=True):
+    elements = with_slack_hinges(unknowns, traced, unknowns.chain)
+    for row, (element, given) in enumerate(zip(elements, unknowns.chain.elements, strict=True)):
         (body,) = bodies_of(given)
         inertia = CompositeBody(float(body.mass), constants(body.first_moment), constants(body.inertia))
         axes, origin = element.rotation, element.translation
         if element.kind == "slide":
             origin = origin + axes[:, 2] * element.coordinates[0]
+        elif bends and element.moving:
+            axes = turned_by(axes, *bends[unknowns.place[unknowns.moving(row)[0]]])
         else:
             axes = turned(axes, element.coordinates[0])
-        joints.append(_Joint(element, axes, origin, inertia))
+        joints.append(Joint(element, axes, origin, inertia))
     return joints
 
 
@@ -85,7 +88,7 @@ def tip_position(plan: MotionPlan, block: Block) -> list[Scalar]:
     return list(tip)
 
 
-def residual(plan: MotionPlan, block: Block, joints: Sequence[_Joint], state: State) -> list[Scalar]:
+def residual(plan: MotionPlan, block: Block, joints: Sequence[Joint], state: State) -> list[Scalar]:
     """Return the torque out of balance on each unknown [N m or N]."""
     unknowns, layout = plan.unknowns, plan.layout
     chain = unknowns.chain
@@ -123,7 +126,7 @@ def residual(plan: MotionPlan, block: Block, joints: Sequence[_Joint], state: St
     return [one + damping[row] @ vector(rates) for row, one in enumerate(total)]
 
 
-def newton_matrix(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> Any:
+def newton_matrix(plan: MotionPlan, block: Block, joints: Sequence[Joint]) -> Any:
     """Return `A`, shape (n, n)."""
     unknowns, layout = plan.unknowns, plan.layout
     n, (half, quarter) = layout.unknowns, plan.factors(block)

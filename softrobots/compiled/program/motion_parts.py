@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 
 from softrobots.compiled.motion.gauss_step import corrections, right_hand_side, stage_values
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.unrolled_motion import (
-    State,
     factored,
     joints_of,
     newton_matrix,
@@ -18,7 +18,7 @@ from softrobots.compiled.motion.unrolled_motion import (
 )
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.complex_numbers import of_parts, parts_of
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.expressions import Expression, Scalar, cosine, sine
 
 
 @dataclass(frozen=True)
@@ -42,40 +42,85 @@ class MotionParts:
     """Texts of those for lanes."""
 
 
+_STAGES = '''def evaluate_stages_SUFFIX(w: Array) -> None:
+    """Write the torques out of balance at both stages."""
+    for i in range(N):
+        place_stages_SUFFIX(w, i, 2 * i)
+    stage_torques_SUFFIX(w)
+
+
+def motion_factor_SUFFIX(w: Array) -> None:
+    """Evaluate and factor; write the correction."""
+    evaluate_stages_SUFFIX(w)
+    stage_factors_SUFFIX(w)
+    correct_stages_SUFFIX(w)
+
+
+def motion_correct_SUFFIX(w: Array) -> None:
+    """Evaluate; write the correction with the factors that are there."""
+    evaluate_stages_SUFFIX(w)
+    correct_stages_SUFFIX(w)'''
+
+
 def unrolled_motion(plan: MotionPlan) -> MotionParts:
     """Trace the functions of an unrolled chain; the factors stand in the first places behind the layout."""
-    layout, n = plan.layout, plan.layout.unknowns
     prepare = Block("motion_prepare", "Compute what depends on motors, force, gravity and time step only.")
-    factor = Block("motion_factor", "Evaluate and factor; write the correction.", trace=prepare.trace)
-    in_stages = layout.in_stages
-    states = [_stage_state(plan, factor, stage) for stage in range(2)] if in_stages else [state_of(plan, factor)]
-    joints = [joints_of(plan, factor, state) for state in states]
-    inverses, lower = factored(newton_matrix(plan, factor, joints[-1]))
-    factors = [*inverses, *(one for row in lower for one in row)]
-    torques = [residual(plan, factor, *both) for both in zip(joints, states, strict=True)]
-    rest = right_hand_side(*torques) if in_stages else torques[0]
-    flat = parts_of(factors) if in_stages else factors
-    factor.store_all(layout.prepared, flat)
-    factor.store_all(layout.correction, _corrections(solved(inverses, lower, rest), in_stages))
-    correct = Block("motion_correct", "Evaluate; write the correction with the factors that are there.", trace=prepare.trace)
-    loaded = correct.loads(layout.prepared, len(flat))
-    kept = of_parts(loaded) if in_stages else loaded
-    rows = [kept[n + row * (row - 1) // 2 : n + row * (row + 1) // 2] for row in range(n)]
-    correct.store_all(layout.correction, _corrections(solved(kept[:n], rows, rest), in_stages))
-    places = (layout.stages, layout.stages + n, layout.position, layout.velocity)
-    given = places if in_stages else (layout.unknown, layout.rate, layout.acceleration)
-    moving = [*loaded, *(one for place in given for one in correct.loads(place, n))]
-    first = layout.prepared + len(flat)
-    size = first + hoist([factor, correct], prepare, moving, first)
+    blocks, size = (_stage_blocks if plan.layout.in_stages else _middle_blocks)(plan, prepare)
     tip = Block("motion_tip", "Write the tip at motors and unknowns.")
-    tip.store_all(layout.tip, tip_position(plan, tip))
-    return MotionParts([prepare, factor, correct, tip], size)
+    tip.store_all(plan.layout.tip, tip_position(plan, tip))
+    loops = [_STAGES.replace("_SUFFIX", suffix) for suffix in ("", "_lanes")] if plan.layout.in_stages else []
+    return MotionParts([prepare, *blocks, tip], size, loops=loops[:1], lane_loops=loops[1:])
 
 
-def _stage_state(plan: MotionPlan, block: Block, stage: int) -> State:
-    values = [stage_values(plan.layout, block, stage, place) for place in range(plan.layout.unknowns)]
-    return list(zip(*values, strict=True))
+def _middle_blocks(plan: MotionPlan, prepare: Block) -> tuple[list[Block], int]:
+    """Trace the functions of the midpoint rule; return the end of their places, too."""
+    layout, n = plan.layout, plan.layout.unknowns
+    factor = Block("motion_factor", "Evaluate and factor; write the correction.", trace=prepare.trace)
+    state = state_of(plan, factor)
+    joints = joints_of(plan, factor, state)
+    inverses, lower = factored(newton_matrix(plan, factor, joints))
+    factors = [*inverses, *(one for row in lower for one in row)]
+    rest = residual(plan, factor, joints, state)
+    factor.store_all(layout.prepared, factors)
+    factor.store_all(layout.correction, solved(inverses, lower, rest))
+    correct = Block("motion_correct", "Evaluate; write the correction with the factors that are there.", trace=prepare.trace)
+    kept = correct.loads(layout.prepared, len(factors))
+    correct.store_all(layout.correction, solved(kept[:n], _rows(kept, n), rest))
+    moving = [*kept, *(one for values in state for one in values)]
+    first = layout.prepared + len(factors)
+    return [factor, correct], first + hoist([factor, correct], prepare, moving, first)
 
 
-def _corrections(found: list[Scalar], in_stages: bool) -> list[Scalar]:
-    return [one for part in corrections(found) for one in part] if in_stages else found
+def _stage_blocks(plan: MotionPlan, prepare: Block) -> tuple[list[Block], int]:
+    """Trace the functions of both stages of Gauss, whose numbers stand side by side, so that compilers do both at once."""
+    layout, n, trace = plan.layout, plan.layout.unknowns, prepare.trace
+    count = n * (n + 1)  # real numbers of the factors
+    unknown, rate, change, cosines, sines, torques, first = (layout.prepared + count + 2 * n * place for place in range(7))
+    place = Block("place_stages", "Place an unknown at both stages.", ("i", "at"))
+    for stage in range(2):
+        for begin, value in zip((unknown, rate, change), stage_values(layout, place, stage, base="i"), strict=True):
+            place.store(begin + stage, value, "at")
+    evaluate = Block("stage_torques", "Write the torques out of balance at both stages.", trace=trace, loop=("stage", 2))
+    state = [[evaluate.load(begin + 2 * row, "stage") for row in range(n)] for begin in (unknown, rate, change)]
+    bends = [(cosine(one), sine(one)) for one in state[0]]
+    for row, torque in enumerate(residual(plan, evaluate, joints_of(plan, evaluate, state, bends), state)):
+        for begin, value in zip((torques, cosines, sines), (torque, *bends[row]), strict=True):
+            evaluate.store(begin + 2 * row, value, "stage")
+    factor = Block("stage_factors", "Factor the matrix of a step at the second stage.", trace=trace)
+    last = [[factor.load(begin + 2 * row + 1) for row in range(n)] for begin in (unknown, rate, change, cosines, sines)]
+    joints = joints_of(plan, factor, last[:3], list(zip(*last[3:], strict=True)))
+    inverses, lower = factored(newton_matrix(plan, factor, joints))
+    factor.store_all(layout.prepared, parts_of([*inverses, *(one for row in lower for one in row)]))
+    correct = Block("correct_stages", "Write the correction.")
+    kept = of_parts(correct.loads(layout.prepared, count))
+    both = [[correct.load(torques + 2 * row + stage) for row in range(n)] for stage in range(2)]
+    found = corrections(solved(kept[:n], _rows(kept, n), right_hand_side(*both)))
+    correct.store_all(layout.correction, [one for part in found for one in part])
+    varying: list[Expression] = [one for values in (*state, *last) for one in values]
+    size = first + hoist([evaluate, factor], prepare, varying, first)
+    return [place, evaluate, factor, correct], size
+
+
+def _rows(factors: Sequence[Scalar], n: int) -> list[Sequence[Scalar]]:
+    """Return the rows of `L` to the left of the diagonal, which stand behind the inverse pivots."""
+    return [factors[n + row * (row - 1) // 2 : n + row * (row + 1) // 2] for row in range(n)]

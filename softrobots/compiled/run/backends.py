@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.drivers import intrinsics
-from softrobots.compiled.program.generated_module import Program
+from softrobots.compiled.drivers import intrinsics, trigonometry
+from softrobots.compiled.program.generated_module import Program, functions_of
 from softrobots.compiled.run.numpy_batches import MotionBatches, NumpyBatches
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import MissingDependency, OutputError
@@ -39,13 +39,16 @@ from math import fabs, sqrt
 
 import numpy as np
 from numba import njit
+from numba.core.types import boolean, float64
+from numba.extending import intrinsic
 
 zeros = np.zeros
 
 
-@njit(inline="always")
-def where(condition, a, b):
-    return a if condition else b
+@intrinsic
+def where(context, condition, a, b):
+    # A select from the start: loops over two stages are not vectorised where it comes from a branch.
+    return float64(boolean, float64, float64), lambda context, builder, signature, values: builder.select(*values)
 
 
 @njit(inline="always")
@@ -148,7 +151,16 @@ def jitted(constants: str, functions: str) -> ModuleType:
 
 
 def _decorated(functions: str) -> str:
-    return re.sub(r"^def ", f"{_JIT}def ", functions, flags=re.MULTILINE)
+    """Return functions with numba's decorators.
+
+    Calls within a loop over both stages of a step keep LLVM from vectorising it. Sine and cosine are inlined for such loops
+    alone, since numba then takes half as long again to compile.
+    """
+    inlined = [one.__name__ for one in functions_of(trigonometry)] if "for stage in range" in functions else []
+    return re.sub(
+        r"^def (\w+)", lambda found: ('@njit(inline="always")\n' if found[1] in inlined else _JIT) + found[0], functions,
+        flags=re.MULTILINE,
+    )  # fmt: skip
 
 
 def _module_of(code: Any, **functions: Callable[[Any], Any]) -> ModuleType:

@@ -37,6 +37,8 @@ class Block:
     """Its expressions."""
     stores: list[tuple[str, int, Scalar]] = field(default_factory=list)
     """Its results: base, offset, value."""
+    loop: tuple[str, int] | None = None
+    """Name and number of the rounds of a loop over all that depends on this base; None: all is done once."""
 
     def load(self, offset: int, base: str = "") -> Expression:
         """Return an element of the workspace."""
@@ -64,10 +66,13 @@ class Block:
         head = ", ".join([f"{WORKSPACE}: Array", *(f"{name}: int" for name in self.parameters)])
         indent = "    "
         lines = [f"def {self.name}({head}) -> None:", f'{indent}"""{self.purpose}"""']
-        if lanes:
-            lines.append(f"{indent}for lane in range(LANES):")
-            indent += "    "
-        body = [f"{indent}{line}" for line in _statements(self.stores, lanes)]
+        statements = list(_statements(self.stores, lanes, "" if self.loop is None or lanes else self.loop[0]))
+        lines += [f"{indent}{line}" for line, repeated in statements if not repeated]
+        for index, count in ((self.loop or ("", 0)), ("lane", "LANES" if lanes else 0)):
+            if count:
+                lines.append(f"{indent}for {index} in range({count}):")
+                indent += "    "
+        body = [f"{indent}{line}" for line, repeated in statements if repeated]
         return "\n".join([*lines, *(body or [f"{indent}pass"])])
 
 
@@ -127,12 +132,19 @@ def hoist(
     return len(kept)
 
 
-def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool) -> Iterator[str]:
+def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool, base: str = "") -> Iterator[tuple[str, bool]]:
+    """Return statements, and whether they depend on a base; all do if it is empty. Others have names that these can use."""
     expressions = in_order([value for _, _, value in stores])
+    varying = {one.number for one in expressions if not base or (one.operation == "load" and one.arguments[1] == base)}
+    for one in expressions:
+        if any(operand.number in varying for operand in one.operands):
+            varying.add(one.number)
+    named = {operand.number for one in expressions if one.number in varying for operand in one.operands}
+    named = (named | {value.number for _, _, value in stores if isinstance(value, Expression)}) - varying
     uses = Counter(one.number for expression in expressions for one in expression.operands)
     uses.update(value.number for _, _, value in stores if isinstance(value, Expression))
     texts: dict[int, tuple[str, int]] = {}  # by number: text and how strongly it binds
-    written = {(base, offset) for base, offset, _ in stores}
+    written = {(place, offset) for place, offset, _ in stores}
     names = 0
     for expression in expressions:
         text, strength = _text(expression, texts, lanes)
@@ -141,14 +153,14 @@ def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool) -> Itera
             expression.operation == "load" and expression.arguments[0] == WORKSPACE and expression.arguments[1:] in written
         )
         shared = uses[expression.number] > 1 and expression.operation != "neg"
-        if changed or shared or len(text) > _WIDEST:
-            yield f"x{names} = {text}"
+        if changed or shared or len(text) > _WIDEST or expression.number in named:
+            yield f"x{names} = {text}", expression.number in varying
             text, strength = f"x{names}", 4
             names += 1
         texts[expression.number] = (text, strength)
-    for base, offset, value in stores:
+    for place, offset, value in stores:
         text = texts[value.number][0] if isinstance(value, Expression) else repr(float(value))
-        yield f"{_element(WORKSPACE, base, offset, lanes)} = {text}"
+        yield f"{_element(WORKSPACE, place, offset, lanes)} = {text}", True
 
 
 def _text(expression: Expression, texts: dict[int, tuple[str, int]], lanes: bool) -> tuple[str, int]:
