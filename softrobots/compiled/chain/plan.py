@@ -32,6 +32,10 @@ class Plan:
     inputs: NumberInputs | None = None
     """The numbers of the chain that are inputs of the code; None if all are constants."""
 
+    def __post_init__(self) -> None:
+        """Join the joints of sections along which actuators wind."""
+        object.__setattr__(self, "unknowns", self.unknowns.joined)
+
     def numbers_in(self, block: Block) -> SerialChain:
         """Return the chain with expressions of a block instead of the numbers that are inputs."""
         chain = self.unknowns.chain

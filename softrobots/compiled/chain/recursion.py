@@ -13,7 +13,17 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Load, Motion, Screw, constants, sliding_joint, turned, turning_joint, vector
+from softrobots.compiled.chain.elements import (
+    Load,
+    Motion,
+    Screw,
+    constants,
+    joined,
+    sliding_joint,
+    turned,
+    turning_joint,
+    vector,
+)
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, RouteSums, eliminate, resized
 from softrobots.compiled.chain.muscle_terms import ElementMuscle, pulls_on
 from softrobots.compiled.trace.expressions import Scalar, if_less, smaller
@@ -38,7 +48,7 @@ class TracedElement:
     """Numbers of an element: constants where they are known when the code is generated, otherwise table entries."""
 
     kind: str
-    """`turn`, `slide` or `section`."""
+    """`turn`, `slide`, `section` or `hinge`."""
     rotation: Any
     """Axes of its frame in those of the element before, shape (3, 3)."""
     translation: Any
@@ -69,6 +79,8 @@ class TracedElement:
     """Part of it that the start of the springs accounts for; with given lengths [N]."""
     routes: RouteSums | None = None
     """What actuators on routes add."""
+    members: Sequence[TracedElement] = ()
+    """The joints of a `hinge`, base to tip."""
 
 
 @dataclass
@@ -83,6 +95,8 @@ class OutwardPass:
     """Axes behind it, shape (3, 3)."""
     screw: Screw | None
     """Screw motion of a section."""
+    members: Sequence[OutwardPass] = ()
+    """Results of the joints of a hinge."""
 
 
 @dataclass
@@ -125,8 +139,33 @@ class InwardPass:
         return (resized(nearer, len(self.twists)) + self.twists @ step)[: 4 if self.inner else 3]
 
 
+def hinge(members: Sequence[TracedElement]) -> TracedElement:
+    """Return spring joints, one behind the other, as one element."""
+
+    def each(values: str) -> list[Scalar]:
+        return [one for member in members for one in getattr(member, values)]
+
+    return replace(
+        members[0],
+        kind="hinge",
+        bodies=[],
+        mass_beyond=members[-1].mass_beyond,
+        coordinates=each("coordinates"),
+        moving=tuple(range(len(members))),
+        stiffness=each("stiffness"),
+        rest=each("rest"),
+        constraints=(None,) * len(members),
+        members=tuple(members),
+    )
+
+
 def outward(element: TracedElement, axes: Any) -> OutwardPass:
     """Outward pass of an element; `axes` are those behind the element before."""
+    if element.members:
+        passes: list[OutwardPass] = []
+        for member in element.members:
+            passes.append(outward(member, passes[-1].end if passes else axes))
+        return replace(passes[0], end=passes[-1].end, members=passes)
     start, shift = axes @ element.rotation, axes @ element.translation
     if element.kind == "section":
         screw = Screw(element.coordinates, element.length)
@@ -230,6 +269,13 @@ def inward(
 
 def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[Load]) -> tuple[Motion, list[Load]]:
     """Return the motion of an element, and the loads with levers from its origin at zero."""
+    if element.members:
+        motions: list[Motion] = []
+        here = list(loads)
+        for member, passed in zip(element.members[::-1], outward_pass.members[::-1], strict=True):
+            motion, here = _motion(member, passed, here)
+            motions.insert(0, motion)
+        return joined(motions), here
     if outward_pass.screw is not None:
         motion, levers = outward_pass.screw.motion(loads, element.bodies, outward_pass.start)
         own = sum((mass for mass, _ in element.bodies), 0.0)

@@ -138,6 +138,11 @@ class Routes:
         """Largest number of unknowns of an element."""
         return max((len(self.unknowns.moving(row)) for row in self.beside), default=0)
 
+    @property
+    def within(self) -> dict[int, int]:
+        """Return the number within its element of each strain that moves beside actuators."""
+        return {strain: place for row in self.beside for place, strain in enumerate(self.unknowns.moving(row))}
+
     def past(self, row: int) -> int:
         """Return the number of components at an element: up to the last actuator of them that goes past it."""
         segment, spans = self.unknowns.segment_at(row), self.unknowns.chain.spans
@@ -154,8 +159,8 @@ class Routes:
         """Return element and path of every point, in the order of the tables."""
         return [(row, path) for row in self.beside for one in self.beside[row] for path in one.paths]
 
-    def tables(self, width: int) -> dict[str, object]:
-        """Return the tables of the loops, with `width` numbers of each point in their table."""
+    def tables(self) -> dict[str, object]:
+        """Return the tables of the loops."""
         count = len(self.unknowns.chain.elements)
         beside = [self.beside.get(row, ()) for row in range(count)]
         pairs, k = [one for row in beside for one in row], self.stride
@@ -170,7 +175,6 @@ class Routes:
             "MEETINGS": tuple(accumulate((k * size for size in past[:-1]), initial=self.meetings)),
             "STRIDE": k,
             "POINTS": self.points,
-            "POINT_WIDTH": width,
             "POINT_RECORD": POINT_RECORD,
             "N_COMPONENTS": self.components,
             "COMPONENT_PUSH": self.cross,

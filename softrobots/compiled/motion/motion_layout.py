@@ -163,7 +163,9 @@ class MotionPlan:
     def routes(self) -> MotionRoutes | None:
         """Places of actuators on routes and of the strains that they hold; None without any."""
         layout = self.layout
-        return MotionRoutes(self.unknowns, layout.prepared, 2 if layout.in_stages else 1) if self.unknowns.routed else None
+        return (
+            MotionRoutes(self.unknowns.joined, layout.prepared, 2 if layout.in_stages else 1) if self.unknowns.routed else None
+        )
 
     @property
     def strains(self) -> tuple[int, int, int, int]:

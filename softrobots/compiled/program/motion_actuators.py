@@ -8,7 +8,7 @@ from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.routes.ends import keep_lengths
-from softrobots.compiled.routes.loops import LENGTHS, PULLS, loops_of
+from softrobots.compiled.routes.loops import lengths_text, loops_of, with_width
 from softrobots.compiled.routes.motion_border import BORDER, border_blocks, factors_text
 from softrobots.compiled.routes.motion_follow import FOLLOW, SWERVE, arms_text, find_tensions, form_blocks, frame_blocks
 from softrobots.compiled.routes.motion_lengths import LENGTHS as HELD
@@ -53,7 +53,7 @@ class ActuatorParts:
 
 def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
     """Trace the functions of the actuators of a looped chain."""
-    unknowns, own, held = plan.unknowns, routes.routes, routes.held
+    unknowns, own, held = routes.unknowns, routes.routes, routes.held
     forms = route_forms(routes)
     strain, rate, *_ = plan.strains
     blocks: list[Block] = []
@@ -62,10 +62,10 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
     for name, form in forms.items():
         added, columns = length_blocks(routes, name, form, routes.swerving if held else None)
         blocks += [*added, *form_blocks(routes, name, form)]
-        before += [(LENGTHS if columns else PULLS, name), (arms_text(name), name)]
-        before += [(SWERVE if columns else _NO_SWERVE, name)] if held else []
+        before += [(lengths_text(columns), name), (arms_text(name), name)]
+        before += [(with_width(SWERVE, columns) if columns else _NO_SWERVE, name)] if held else []
         if columns:
-            tables |= own.tables(columns.width) | {"POINT_TABLE": tuple(columns.numbers)}
+            tables |= own.tables() | {f"POINT_TABLE_{name}": tuple(columns.numbers)}
     named = {form: (number, name) for number, (name, form) in enumerate(forms.items())}
     calls: dict[str, list[tuple[int, str]]] = {"follow": [], "swerve": []} if held else {"follow": [], "pull": []}
     for number, name in named.values():

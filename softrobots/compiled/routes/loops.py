@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from softrobots.compiled.trace.blocks import TableColumns
+
 LENGTHS = '''def follow_routes_FORM(w: Array, element: int, q: int) -> None:
     """Add an element to the lengths of the actuators beside it, and find the slopes of these."""
     for m in range(N_ROWS[element]):
@@ -75,6 +77,16 @@ def pull_FORM(w: Array, element: int) -> None:
     """Add nothing to an element without actuators beside it."""
     clear_pulls_FORM(w)'''
 """The same for elements between the parts of a route."""
+
+
+def lengths_text(columns: TableColumns | None) -> str:
+    """Return the loops over lengths and tensions beside elements of a form, with the table of their points if they have any."""
+    return with_width(LENGTHS, columns) if columns else PULLS
+
+
+def with_width(text: str, columns: TableColumns) -> str:
+    """Return a text with the width of the table of points."""
+    return text.replace("POINT_WIDTH", str(columns.width))
 
 
 def components_text(*, held: bool) -> str:
