@@ -43,16 +43,14 @@ def read_chain(
 
     Raises:
         DescriptionError: If an inflated link has a plateau, a joint is not on the way from base to tip or neither turns nor
-            slides, the springs of a slack wall are not two that turn, one behind the other, an actuator winds along a lumped
-            section whose joints are apart, or given lengths depend on each other otherwise than those of muscles that run
-            straight along a whole segment.
+            slides, the springs of a slack wall are not two that turn, one behind the other, or an actuator winds along a lumped
+            section whose joints are apart.
     """
     if any(group.max_moment is not None for group in groups):
         raise DescriptionError(
             f"an inflated link of {pinocchio_model.name} has max_moment; compiled solvers need springs that are linear, or "
             "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
         )
-    _check_actuators(str(pinocchio_model.name), structure)
     tip = pinocchio_model.frames[tip_frame]
     elements, axes = _elements(pinocchio_model, _path(pinocchio_model, tip.parentJoint, str(tip.name)), structure)
     tip_rotation, tip_translation = _placed(tip.placement, axes)
@@ -80,20 +78,6 @@ def read_chain(
         wound=_wound(str(pinocchio_model.name), elements, structure),
     )
     return replace(chain, constrained=(), constrained_slope=read_only(np.zeros((0, muscles)))) if chain.routed else chain
-
-
-def _check_actuators(name: str, structure: Structure) -> None:
-    """Refuse actuators that compiled solvers do not take."""
-    held, muscles = structure.muscle_lengths, structure.muscles
-    unlike: set[str] = set()
-    if held is not None and len(held.slopes) != len(muscles):
-        unlike = {tag.name for tag in muscles if not held.groups or len(tag.segments) > 1 or not tag.straight}
-    if unlike:
-        raise DescriptionError(
-            f"{name} has actuators that compiled solvers do not take ({', '.join(sorted(unlike))}); required: "
-            "given lengths that do not depend on each other, or those of muscles along one whole "
-            "segment each (solve_equilibrium accepts the others, too)"
-        )
 
 
 def chain_length(pinocchio_model: Any, tip_frame: int, strained: Collection[str]) -> float:

@@ -153,8 +153,13 @@ class SerialChain:
 
     @cached_property
     def routed(self) -> bool:
-        """Whether an actuator is not of given length or tension, winds, or passes other sections than those it overlaps."""
+        """Whether an actuator is not of given length or tension, winds, or passes other sections than those it overlaps.
+
+        Also where lengths constrain other combinations of strains than sums.
+        """
         if any(one.kind not in ("length", "tension") or not one.straight for one in self.actuators):
+            return True
+        if self.actuators and self.muscle_input == "lengths" and not self.constrained:
             return True
         paths, shared = self.muscle_paths, False
         for muscles in self.overlapping:
