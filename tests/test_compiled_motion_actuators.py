@@ -38,6 +38,8 @@ ARMS: dict[str, Callable[[], sr.SoftModel]] = {
     "uneven lengths": ROBOTS["uneven"],
     "winding lengths": ROBOTS["coils"],
     "lengths on an arm": ROBOTS["stacked"],
+    "lumped winding": ROBOTS["lumped_winding"],
+    "lumped coils": ROBOTS["lumped_coils"],
 }
 
 
@@ -116,7 +118,7 @@ def test_inputs_may_move(name: str, rng: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize("order", [2, 4])
-@pytest.mark.parametrize("name", ["tendons", "winding", "lengths", "winding lengths"])
+@pytest.mark.parametrize("name", ["tendons", "winding", "lengths", "winding lengths", "lumped winding", "lumped coils"])
 def test_a_step_solves_the_equations_of_motion(name: str, order: int, rng: np.random.Generator) -> None:
     """Pinocchio's equations at the stages of one step from a fast random state; damped by a number for each strain."""
     model, h = robot(name), 5e-4
