@@ -75,6 +75,8 @@ class ChainHinge:
 
     joints: tuple[ChainJoint, ...]
     """The joints."""
+    masses_beyond: tuple[float, ...]
+    """Mass beyond each [kg]."""
 
 
 Element: TypeAlias = ChainJoint | ChainSection
@@ -137,7 +139,8 @@ class SerialChain:
         """The chain with the joints of each of `wound` as one element, a `ChainHinge`; itself if there is none."""
         elements: list[Any] = list(self.elements)
         for first, last in reversed(self.wound):
-            elements[first : last + 1] = [ChainHinge(tuple(elements[first : last + 1]))]
+            rows = slice(first, last + 1)
+            elements[rows] = [ChainHinge(self.elements[rows], self.masses_beyond[rows])]  # type: ignore[arg-type]
         return replace(self, elements=tuple(elements), wound=()) if self.wound else self
 
     @cached_property

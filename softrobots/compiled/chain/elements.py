@@ -137,19 +137,6 @@ def _single(twist: Vector, bend: Vector, move: Vector, torques: Sequence[Scalar]
     return Motion(twists, bends, moves, [sum(torques)], [sum(torques[1:])], matrix([[curvature]]))
 
 
-def joined(motions: Sequence[Motion]) -> Motion:
-    """Return the motion of joints, base to tip, as that of one element with all their coordinates."""
-    twists, bends, moves = (
-        np.concatenate([getattr(one, name) for one in motions], axis=1) for name in ("twists", "bends", "moves")
-    )
-    curvature = twists.T @ bends
-    for row, one in enumerate(motions):
-        curvature[row, row] = one.curvature[0, 0]
-        curvature[row, :row] = curvature[:row, row]
-    torque, weight = ([value for one in motions for value in getattr(one, name)] for name in ("torque", "weight"))
-    return Motion(twists, bends, moves, torque, weight, curvature)
-
-
 class Screw:
     """Screw motion of a section in the axes of its start: `u = p(z) + R(z) r` for a lever `r` at its end.
 

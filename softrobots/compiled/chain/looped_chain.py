@@ -22,8 +22,9 @@ from softrobots.compiled.chain.layout import Layout, RecursionLayout
 from softrobots.compiled.chain.looped_sides import before_by_lengths, follow_motor, given_loads, store_tip_step
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, hinge, inward, outward
+from softrobots.compiled.chain.recursion import Balance, InwardPass, inward, outward
 from softrobots.compiled.chain.routes import Routes
+from softrobots.compiled.chain.traced_elements import TracedElement, hinge
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block, TableColumns, hoist
 from softrobots.compiled.trace.expressions import Expression, Scalar

@@ -12,12 +12,11 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
-from softrobots.compiled.chain.recursion import TracedElement, hinge
+from softrobots.compiled.chain.traced_elements import TracedElement, hinge
 from softrobots.compiled.settings import LARGEST_NUMBER, LARGEST_POSITION, MAX_UNROLLED_JOINTS
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, scalar
 from softrobots.constant_curvature.strain_chain import STRAINS
-from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.model.actuator_laws import ROUNDING, ActuatorLaws
 from softrobots.model.serial_chain import ChainHinge, ChainJoint, ChainSection, Element, SerialChain, bodies_of, strains_of
@@ -80,11 +79,6 @@ class Unknowns:
             raise ParameterError("model", self.chain.name, requirement)
         if self.locked and not self._locked_strains:
             raise ParameterError("locked_strains", self.locked, "empty for a robot without sections of constant strain")
-
-    @property
-    def joined(self) -> Unknowns:
-        """The same with the joints of sections along which actuators wind as one element each."""
-        return replace(self, chain=self.chain.joined) if self.chain.wound else self
 
     @cached_property
     def strains(self) -> tuple[int, ...]:
@@ -162,10 +156,7 @@ class Unknowns:
         chain = self.chain if numbers is None else numbers
         element: Element | ChainHinge = chain.elements[row]
         if isinstance(element, ChainHinge):
-            masses = [
-                *itertools.accumulate((joint.body.mass for joint in element.joints[:0:-1]), initial=chain.masses_beyond[row])
-            ]
-            pairs = zip(element.joints, masses[::-1], strict=True)
+            pairs = zip(element.joints, element.masses_beyond, strict=True)
             return hinge([self._traced(chain, joint, mass, motor, unknown) for joint, mass in pairs])
         return replace(self._traced(chain, element, chain.masses_beyond[row], motor, unknown), muscles=self._muscles(row))
 
@@ -240,12 +231,6 @@ class Unknowns:
         """Number of multipliers: of constrained sums, or of lengths of routed muscles."""
         return len(self.chain.actuators) if self.held_lengths else len(self.chain.constrained)
 
-    @cached_property
-    def length_softness(self) -> FloatArray:
-        """Change of each length at rest by its own tension, shape (n_muscles,) [m/N]."""
-        arms = self.chain.muscle_paths.at(self.chain.rest).arms
-        return np.asarray((arms**2 / self.chain.stiffness).sum(axis=1))
-
     @property
     def n_tensions(self) -> int:
         """Number of muscles of which an input is in the workspace: all but those that constrain sums of strains."""
@@ -276,8 +261,10 @@ class Unknowns:
     @property
     def spring_rounding(self) -> float:
         """Rounding of the torques of springs and stiff tendons [N m], see `SoftModel.rounding`."""
-        chain, strains = self.chain, list(self.strains)
-        held = float(np.linalg.norm(chain.muscle_paths.rest / self.length_softness)) * ROUNDING if self.held_lengths else 0.0
+        chain, strains, held = self.chain, list(self.strains), 0.0
+        if self.held_lengths:  # rounding of each length, over its change by its own tension
+            softness = (chain.muscle_paths.at(chain.rest).arms ** 2 / chain.stiffness).sum(axis=1)
+            held = float(np.linalg.norm(chain.muscle_paths.rest / softness)) * ROUNDING
         return (
             held
             + ActuatorLaws(chain.actuators).rounding

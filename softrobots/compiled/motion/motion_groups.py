@@ -12,7 +12,8 @@ import numpy as np
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.looped_chain import element_signature, table_element
 from softrobots.compiled.chain.muscle_terms import pulls_on
-from softrobots.compiled.chain.recursion import TracedElement, range_margin
+from softrobots.compiled.chain.recursion import range_margin
+from softrobots.compiled.chain.traced_elements import TracedElement
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import CompositeBody, JointState, RigidBody, SectionState, joint_state, round_part
