@@ -211,8 +211,7 @@ def test_a_step_beyond_the_range_of_a_route_fails() -> None:
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("name", ["tendons", "winding lengths"])
-@pytest.mark.parametrize("order", [2, 4])
+@pytest.mark.parametrize(("name", "order"), [("tendons", 2), ("tendons", 4), ("winding lengths", 2), ("lumped winding", 4)])
 def test_the_c_file_takes_the_same_steps(name: str, order: int, tmp_path: Path, rng: np.random.Generator) -> None:
     """Through ctypes."""
     model, motors, h = robot(name), inputs(robot(name), rng), 1e-3

@@ -138,11 +138,6 @@ class Routes:
         """Largest number of unknowns of an element."""
         return max((len(self.unknowns.moving(row)) for row in self.beside), default=0)
 
-    @property
-    def within(self) -> dict[int, int]:
-        """Return the number within its element of each strain that moves beside actuators."""
-        return {strain: place for row in self.beside for place, strain in enumerate(self.unknowns.moving(row))}
-
     def past(self, row: int) -> int:
         """Return the number of components at an element: up to the last actuator of them that goes past it."""
         segment, spans = self.unknowns.segment_at(row), self.unknowns.chain.spans

@@ -64,7 +64,8 @@ class MovingGroup:
         """From its end to the beginning of the next group, or to the tip, in the axes of its end [m]."""
         half, quarter = (one * (1.0 / plan.massive(block)) for one in plan.factors(block))
         place, routes = 0, plan.routes
-        within: dict[int, int] = {} if routes is None else routes.routes.within
+        beside = [] if routes is None else [routes.unknowns.moving(row) for row in routes.routes.beside]
+        within = {strain: number for strains in beside for number, strain in enumerate(strains)}
         for rows in zip(*groups, strict=True):
             ones = [unknowns.traced(row) for row in rows]
             element = replace(table_element(ones, columns), rotation=columns.entries([parts[row].rotation for row in rows]))

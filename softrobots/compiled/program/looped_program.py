@@ -17,7 +17,7 @@ from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.looped_frame import looped_frame
 from softrobots.compiled.routes.ends import held_blocks, keep_lengths, leave_segment, start_lengths
-from softrobots.compiled.routes.loops import around, components_text, lengths_text, loops_of
+from softrobots.compiled.routes.loops import LENGTHS, PULLS, around, components_text, loops_of
 from softrobots.compiled.routes.terms import component_blocks, form_of, length_blocks, route_forms
 from softrobots.compiled.trace.blocks import Block
 
@@ -167,7 +167,10 @@ def _along_routes(plan: Plan) -> tuple[list[Block], list[tuple[str, str]], dict[
     for name, form in route_forms(plan).items():
         added, columns = length_blocks(plan, name, form)
         blocks += added + component_blocks(plan, name, form)
-        loops += [(lengths_text(columns), name), (components_text(held=plan.unknowns.held_lengths), name)]
+        loops += [
+            (LENGTHS.replace("POINT_WIDTH", str(columns.width)) if columns else PULLS, name),
+            (components_text(held=plan.unknowns.held_lengths), name),
+        ]
         if columns:
             tables |= plan.routes.tables() | {f"POINT_TABLE_{name}": tuple(columns.numbers)}
     return blocks, loops, tables

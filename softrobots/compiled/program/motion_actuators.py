@@ -8,7 +8,7 @@ from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.routes.ends import keep_lengths
-from softrobots.compiled.routes.loops import lengths_text, loops_of, with_width
+from softrobots.compiled.routes.loops import LENGTHS, PULLS, loops_of
 from softrobots.compiled.routes.motion_border import BORDER, border_blocks, factors_text
 from softrobots.compiled.routes.motion_follow import FOLLOW, SWERVE, arms_text, find_tensions, form_blocks, frame_blocks
 from softrobots.compiled.routes.motion_lengths import LENGTHS as HELD
@@ -62,8 +62,9 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
     for name, form in forms.items():
         added, columns = length_blocks(routes, name, form, routes.swerving if held else None)
         blocks += [*added, *form_blocks(routes, name, form)]
-        before += [(lengths_text(columns), name), (arms_text(name), name)]
-        before += [(with_width(SWERVE, columns) if columns else _NO_SWERVE, name)] if held else []
+        texts = [LENGTHS, SWERVE] if columns else [PULLS, _NO_SWERVE]
+        texts = [text.replace("POINT_WIDTH", str(columns.width)) if columns else text for text in texts[: 1 + held]]
+        before += [(text, name) for text in (*texts, arms_text(name))]
         if columns:
             tables |= own.tables() | {f"POINT_TABLE_{name}": tuple(columns.numbers)}
     named = {form: (number, name) for number, (name, form) in enumerate(forms.items())}

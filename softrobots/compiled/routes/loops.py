@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from softrobots.compiled.trace.blocks import TableColumns
-
 LENGTHS = '''def follow_routes_FORM(w: Array, element: int, q: int) -> None:
     """Add an element to the lengths of the actuators beside it, and find the slopes of these."""
     for m in range(N_ROWS[element]):
@@ -79,16 +77,6 @@ def pull_FORM(w: Array, element: int) -> None:
 """The same for elements between the parts of a route."""
 
 
-def lengths_text(columns: TableColumns | None) -> str:
-    """Return the loops over lengths and tensions beside elements of a form, with the table of their points if they have any."""
-    return with_width(LENGTHS, columns) if columns else PULLS
-
-
-def with_width(text: str, columns: TableColumns) -> str:
-    """Return a text with the width of the table of points."""
-    return text.replace("POINT_WIDTH", str(columns.width))
-
-
 def components_text(*, held: bool) -> str:
     """Return the loops over lengths; `held`: whether those are given, and steps do not change their multipliers."""
     if not held:
@@ -108,5 +96,5 @@ def around(name: str, form: str, infix: str) -> tuple[list[str], list[str]]:
 
 
 def loops_of(text: str, form: str, suffix: str) -> str:
-    """Return loops for a form of elements; those of batches end in the suffix."""
+    """Return loops for a form of elements; those of batches end in the suffix, `POINT_WIDTH` has been replaced."""
     return text.replace("_FORM", f"_{form}{suffix}")
