@@ -43,9 +43,10 @@ def test_compiled_derivatives_are_those_of_pinocchio(kind: str) -> None:
 
 
 CHAINS: dict[str, Any] = {"stacked": ROBOTS["stacked"], "on_an_arm": ROUTED["on_an_arm"], "lumped": ROUTED["lumped"]}
+CHAINS |= {name: ROUTED[name] for name in ("lumped_winding", "lumped_coils")}
 
 
-@pytest.mark.parametrize("name", [one if one == "lumped" else pytest.param(one, marks=pytest.mark.study) for one in CHAINS])
+@pytest.mark.parametrize("name", [one if "lumped" in one else pytest.param(one, marks=pytest.mark.study) for one in CHAINS])
 def test_compiled_rates_are_differences(name: str) -> None:
     """Along a change of motor joints, actuators and force at once; reverse mode is the transpose."""
     model = CHAINS[name]()

@@ -21,7 +21,7 @@ from tests.support.oracles import central_difference
 from tests.support.routed_arms import actuator, curve_length, routed
 from tests.support.routed_robots import ROBOTS
 from tests.support.screw_motions import screw_matrix
-from tests.support.serial_chains import ARM, LAWS, LENGTHS, ROUTES
+from tests.support.serial_chains import ARM, LAWS, LENGTHS, LUMPED, ROUTES
 
 GRAVITY = np.array([0.4, -1.0, -9.7])  # [m/s^2]
 
@@ -111,7 +111,9 @@ def test_balance_of_curves_in_a_rod(rng: np.random.Generator) -> None:
         assert np.abs(torques).max() < 1e-9  # of springs of 4 N m/rad and tensions of 30 N
 
 
-@pytest.mark.parametrize("name", ["tendons", "winding", "lumped", "winding_lengths", "on_an_arm"])
+@pytest.mark.parametrize(
+    "name", ["tendons", "winding", "lumped", "winding_lengths", "on_an_arm", "lumped_winding", "lumped_coils"]
+)
 def test_what_actuators_do_and_feel(name: str, rng: np.random.Generator) -> None:
     """The Jacobian and loads are those of Pinocchio's path; loads change by a force as differences say."""
     model, search = robot(name), searching(name, gravity=True)
@@ -132,7 +134,7 @@ def test_what_actuators_do_and_feel(name: str, rng: np.random.Generator) -> None
 
     size = 1e-5 * float(np.linalg.norm(force))
     assert np.abs(central_difference(felt, np.zeros(3), size) - feeling).max() <= 1e-5 * np.abs(feeling).max()
-    if name in ("tendons", "winding_lengths"):  # the tension is the slope of the energy by the input
+    if name in ("tendons", "winding_lengths", "lumped_coils"):  # the tension is the slope of the energy by the input
         assert np.abs(feeling - search.jacobian(state.w).T).max() <= 1e-9 * np.abs(feeling).max()
 
 
@@ -176,21 +178,54 @@ def test_redundant_tendons_get_the_least_tension(kind: str, rng: np.random.Gener
     assert np.linalg.norm(least) < np.linalg.norm(rest)  # what they had before reaches the target, too
 
 
-def test_what_is_not_compiled_is_refused_by_name() -> None:
-    winding = routed(
-        actuator("coil", (1, (0.0, 0.5), (0.04, 0.04), (0.0, 1.0)), kind="tension"),
-        segment_lengths=LENGTHS,
-        chain="lumped",
-        hinges=1,
-    )
-    with pytest.raises(sr.DescriptionError, match=r"\(coil\).*straight ones along lumped sections"):
-        sr.compile(winding, backend="python")
-    with pytest.raises(sr.DescriptionError, match="lengths that do not depend on each other"):
-        sr.compile(sr.load_model(sr.PccArm(**ARM, routing="base", muscle_azimuths=(0.0, 1.5, 3.0, 4.5))), backend="python")
+def test_joints_of_a_section_that_are_apart_are_refused_by_name() -> None:
+    coiled = actuator("coil", (1, (0.0, 0.5), (0.04, 0.04), (0.0, 1.0)), kind="tension")
+    urdf = sr.PccArm(segment_lengths=LENGTHS, chain="lumped", hinges=1, muscle_azimuths=()).urdf()
+    before, behind = urdf.split('<joint name="section_1_1_bend_y"')
+    apart = before + '<joint name="section_1_1_bend_y"' + behind.replace('xyz="0.0 0.0 0.0"', 'xyz="0.0 0.0 0.01"', 1)
+    with pytest.raises(sr.DescriptionError, match="section section_1_1, whose joints are apart"):
+        sr.compile(sr.load_model(apart.replace("</robot>", coiled + "</robot>")), backend="python")
+
+
+def straight(azimuth: float, name: str) -> str:
+    return actuator(name, (1, (0.0, 0.5), (0.04, 0.04), (azimuth, azimuth)), kind="length")
+
+
+ANY_LENGTHS: dict[str, Callable[[], sr.SoftModel]] = {
+    "four_from_the_base": lambda: sr.load_model(sr.PccArm(**ARM, routing="base", muscle_azimuths=(0.0, 1.5, 3.0, 4.5))),
+    "without_stretch": lambda: sr.load_model(sr.PccArm(**LUMPED, hinges=2, extension=False)),
+    "two": lambda: routed(straight(0.0, "one"), straight(1.5, "other"), segment_lengths=(0.5,), elastic_sections=2),
+    "two_alike": lambda: routed(straight(0.0, "one"), straight(0.0, "other"), segment_lengths=(0.5,), elastic_sections=2),
+}
+"""More lengths than a segment has directions to choose, and fewer."""
+
+
+@pytest.mark.parametrize("name", ANY_LENGTHS)
+def test_any_number_of_given_lengths(name: str, rng: np.random.Generator) -> None:
+    """Of a random shape without twist: springs, tensions, the Jacobian and steps of time are those of the general engine."""
+    model = ANY_LENGTHS[name]()
+    compiled, chain = sr.compile(model, backend="python"), model.chain()
+    bent = 0.01 * rng.normal(size=chain.rest.size) * np.any(chain.muscle_paths.matrix, axis=0)
+    motors = model.relaxed_motors + chain.muscle_paths.matrix @ bent
+    force = 0.1 * rng.normal(size=3)
+    there = sr.solve_equilibrium(model, motors, force, gravity=GRAVITY)
+    here = compiled.equilibrium(motors, force, gravity=GRAVITY)
+    np.testing.assert_allclose(here.q_springs, there.q_springs, rtol=0, atol=1e-9)
+    run = compiled._run(True)
+    status, state = compiled._search(run).settle(motors, force, GRAVITY, model.rest)
+    assert status == Status.CERTIFIED
+    run.look_at_tip(state.w)
+    loads, expected = compiled._actuation.loads(run, state.w), there.motor_torques
+    np.testing.assert_allclose(loads, expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    expected = sr.elastostatic_jacobian(model, there)
+    np.testing.assert_allclose(compiled._actuation.jacobian(run, state.w), expected, rtol=0, atol=1e-9 * np.abs(expected).max())
+    given = {"gravity": GRAVITY, "time_step": 1e-3}
+    moved, expected = compiled.simulate(4e-3, motors, **given), sr.simulate(model, 4e-3, motors, **given).tip_position
+    np.testing.assert_allclose(moved.tip_position, expected, rtol=0, atol=1e-9)
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("name", ["tendons", "winding_lengths"])
+@pytest.mark.parametrize("name", ["tendons", "winding_lengths", "lumped_coils"])
 def test_the_same_in_c(name: str, tmp_path: Path, rng: np.random.Generator) -> None:
     """Equilibria with weight, and the Jacobian from the response of the tip; sine and cosine differ from libm's by an ulp."""
     model, heavy = robot(name), solver(name)._run(True)

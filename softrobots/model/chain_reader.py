@@ -43,16 +43,14 @@ def read_chain(
 
     Raises:
         DescriptionError: If an inflated link has a plateau, a joint is not on the way from base to tip or neither turns nor
-            slides, the springs of a slack wall are not two that turn, one behind the other, an actuator winds along lumped
-            sections, or given lengths depend on each other otherwise than those of muscles that run straight along a whole
-            segment.
+            slides, the springs of a slack wall are not two that turn, one behind the other, or an actuator winds along a lumped
+            section whose joints are apart.
     """
     if any(group.max_moment is not None for group in groups):
         raise DescriptionError(
             f"an inflated link of {pinocchio_model.name} has max_moment; compiled solvers need springs that are linear, or "
             "smooth, moment_law slack_wall (solve_equilibrium accepts the others, too)"
         )
-    _check_actuators(str(pinocchio_model.name), structure)
     tip = pinocchio_model.frames[tip_frame]
     elements, axes = _elements(pinocchio_model, _path(pinocchio_model, tip.parentJoint, str(tip.name)), structure)
     tip_rotation, tip_translation = _placed(tip.placement, axes)
@@ -77,24 +75,9 @@ def read_chain(
         spread=read_only(np.zeros((count, muscles))) if given is None else given.spread,
         free=read_only(np.eye(count)) if given is None else given.free,
         slack_hinges=_slack_hinges(str(pinocchio_model.name), elements, groups),
+        wound=_wound(str(pinocchio_model.name), elements, structure),
     )
     return replace(chain, constrained=(), constrained_slope=read_only(np.zeros((0, muscles)))) if chain.routed else chain
-
-
-def _check_actuators(name: str, structure: Structure) -> None:
-    """Refuse actuators that compiled solvers do not take."""
-    paths, held, muscles = structure.muscle_paths, structure.muscle_lengths, structure.muscles
-    unlike: set[str] = set()
-    if held is not None and len(held.slopes) != len(muscles):
-        unlike = {tag.name for tag in muscles if not held.groups or len(tag.segments) > 1 or not tag.straight}
-    if paths.lumped:
-        unlike |= {muscles[muscle].name for muscle in paths.muscle[~paths.separable].tolist()}
-    if unlike:
-        raise DescriptionError(
-            f"{name} has actuators that compiled solvers do not take ({', '.join(sorted(unlike))}); required: straight ones "
-            "along lumped sections, and given lengths that do not depend on each other, or those of muscles along one whole "
-            "segment each (solve_equilibrium accepts the others, too)"
-        )
 
 
 def chain_length(pinocchio_model: Any, tip_frame: int, strained: Collection[str]) -> float:
@@ -127,6 +110,23 @@ def _slack_hinges(name: str, elements: Sequence[Element], groups: Sequence[Sprin
                     "that turn, one behind the other"
                 )
             found.append((min(hinge), max(hinge), group.slack_moment))
+    return tuple(found)
+
+
+def _wound(name: str, elements: Sequence[Element], structure: Structure) -> tuple[tuple[int, int], ...]:
+    """The joints of lumped sections along which actuators wind, see `SerialChain.wound`."""
+    paths, found = structure.muscle_paths, []
+    winding = {one for one, straight in zip(paths.sections, paths.separable, strict=True) if paths.lumped and not straight}
+    row_of = {element.strain: row for row, element in enumerate(elements) if winding and isinstance(element, ChainJoint)}
+    for section in structure.section_table:
+        if section.name in winding:
+            rows = sorted(row_of[place] for place in section.places.values())
+            if rows[-1] - rows[0] >= len(rows) or any(np.any(elements[row].translation) for row in rows[1:]):
+                raise DescriptionError(
+                    f"{name} has actuators that wind along section {section.name}, whose joints are apart; compiled solvers "
+                    "need them at one point, one behind the other"
+                )
+            found.append((rows[0], rows[-1]))
     return tuple(found)
 
 

@@ -6,9 +6,9 @@ welded bodies of the description are part of the constant placements between the
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import NamedTuple, TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 
@@ -69,6 +69,16 @@ class ChainSection:
     the axes of the start; the last is the end of the section."""
 
 
+@dataclass(frozen=True, eq=False)
+class ChainHinge:
+    """The joints of a lumped section, base to tip, as one element: the length of a winding route depends on all of them."""
+
+    joints: tuple[ChainJoint, ...]
+    """The joints."""
+    masses_beyond: tuple[float, ...]
+    """Mass beyond each [kg]."""
+
+
 Element: TypeAlias = ChainJoint | ChainSection
 """Joint or section."""
 
@@ -121,6 +131,17 @@ class SerialChain:
     """Part of the strains by elastic coordinates, shape (n_strains, n_springs)."""
     slack_hinges: tuple[tuple[int, int, float], ...] = ()
     """The two strains, base to tip, of each hinge of an inflated link whose wall goes slack, and the moment of that [N m]."""
+    wound: tuple[tuple[int, int], ...] = ()
+    """First and last joint of each lumped section along which an actuator winds, base to tip."""
+
+    @cached_property
+    def joined(self) -> SerialChain:
+        """The chain with the joints of each of `wound` as one element, a `ChainHinge`; itself if there is none."""
+        elements: list[Any] = list(self.elements)
+        for first, last in reversed(self.wound):
+            rows = slice(first, last + 1)
+            elements[rows] = [ChainHinge(self.elements[rows], self.masses_beyond[rows])]  # type: ignore[arg-type]
+        return replace(self, elements=tuple(elements), wound=()) if self.wound else self
 
     @cached_property
     def overlapping(self) -> list[list[int]]:
@@ -135,8 +156,13 @@ class SerialChain:
 
     @cached_property
     def routed(self) -> bool:
-        """Whether an actuator is not of given length or tension, winds, or passes other sections than those it overlaps."""
+        """Whether an actuator is not of given length or tension, winds, or passes other sections than those it overlaps.
+
+        Also where lengths constrain other combinations of strains than sums.
+        """
         if any(one.kind not in ("length", "tension") or not one.straight for one in self.actuators):
+            return True
+        if self.actuators and self.muscle_input == "lengths" and not self.constrained:
             return True
         paths, shared = self.muscle_paths, False
         for muscles in self.overlapping:
@@ -167,13 +193,17 @@ class SerialChain:
         return {strain: row for row, element in enumerate(self.elements) for strain in strains_of(element)}
 
 
-def bodies_of(element: Element) -> tuple[ChainBody, ...]:
+def bodies_of(element: Element | ChainHinge) -> tuple[ChainBody, ...]:
     """Return the bodies of an element."""
+    if isinstance(element, ChainHinge):
+        return tuple(joint.body for joint in element.joints)
     return element.bodies if isinstance(element, ChainSection) else (element.body,)
 
 
-def strains_of(element: Element) -> tuple[int, ...]:
+def strains_of(element: Element | ChainHinge) -> tuple[int, ...]:
     """Return the indices of the strains of an element; none for a motor."""
+    if isinstance(element, ChainHinge):
+        return tuple(strain for joint in element.joints for strain in strains_of(joint))
     if isinstance(element, ChainSection):
         return tuple(element.strain + place for place in range(4))
     return () if element.strain is None else (element.strain,)

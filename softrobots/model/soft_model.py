@@ -280,7 +280,7 @@ class SoftModel(SummarisedRobot):
         Raises:
             DescriptionError: If a joint is not between base and tip, or neither turns nor slides, if an inflated link has a
                 plateau, or a slack wall with other springs than two that turn, one behind the other, or if an actuator winds
-                along lumped sections, or a given length runs otherwise than straight along one segment.
+                along a lumped section whose joints are apart.
         """
         return self._chain
 

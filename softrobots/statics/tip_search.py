@@ -182,7 +182,9 @@ def search(
             stationary = nearer <= 1e-6 * float(np.linalg.norm(missing)) and pulled.excess <= TENSION_TOLERANCE
         if arrived and float(np.abs(drift).max()) <= SAME:
             return replace(here, iterations=iteration - 1, unsolved=unsolved)
-        pace = pace if last is None else _pace(*last, drift)
+        # Where limits stop one of the two drifts, their difference tells nothing of the valley.
+        if last is not None and (pulled is None or min(np.abs(last[1]).max(), np.abs(drift).max()) > SAME):
+            pace = _pace(*last, drift)
         miss, last = here.miss(model), None
         if not arrived and stationary:
             refused += 1

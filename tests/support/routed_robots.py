@@ -19,6 +19,8 @@ ROBOTS: dict[str, Callable[[], sr.SoftModel]] = {
         sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(**ARM, kind="length", routing="base"))
     ),
     "winding_lengths": SERIAL_CHAINS["coils"],
+    "lumped_winding": SERIAL_CHAINS["lumped_winding"],
+    "lumped_coils": SERIAL_CHAINS["lumped_coils"],
     "on_an_arm": lambda: sr.load_model(
         sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(**ARM, kind="elastic", routing="base"))
     ),

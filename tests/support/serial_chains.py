@@ -51,6 +51,7 @@ def uneven() -> SoftModel:
 
 LENGTHS = (0.5, 0.4)
 ARM: dict[str, Any] = {"segment_lengths": LENGTHS, "elastic_sections": 1, "offset": 0.0}
+LUMPED: dict[str, Any] = {"segment_lengths": LENGTHS, "chain": "lumped", "offset": 0.0}
 LAWS: dict[str, dict[str, float]] = {
     "elastic": {"stiffness": 9e3, "pretension": 3.0},
     "mckibben": {"diameter": 0.008, "braid_angle": 0.5},
@@ -64,6 +65,12 @@ ROUTES: dict[str, list[Piece]] = {
     "tension": [(2, (0.1, 0.4), (0.03, 0.04), (5.0, 3.5))],
 }
 """A helix through both segments, a cone within the first, a straight chamber from its middle on, and a helical cone."""
+
+HALF_STRAIGHT = ROUTES | {
+    "elastic": [(1, (0.0, 0.5), (0.04, 0.04), (0.0, 0.0)), *ROUTES["elastic"][1:]],
+    "mckibben": [(1, (0.1, 0.4), (0.04, 0.04), (2.0, 2.0))],
+}
+"""The same, straight along the first segment."""
 
 
 def coil(azimuth: float) -> str:
@@ -86,6 +93,12 @@ ROBOTS: dict[str, Callable[[], SoftModel]] = {
     "tendons": lambda: sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.0625), elastic_sections=2)),
     "winding": lambda: routed(*(actuator(kind, *ROUTES[kind], kind=kind, **law) for kind, law in LAWS.items()), **ARM),
     "coils": lambda: routed(*(coil(place) for place in (0.0, 2.0, 4.0)), **ARM),
+    "lumped_winding": lambda: routed(
+        *(actuator(kind, *HALF_STRAIGHT[kind], kind=kind, **law) for kind, law in LAWS.items()),
+        **LUMPED,
+        hinges=2,
+    ),
+    "lumped_coils": lambda: routed(*(coil(place) for place in (0.0, 2.0, 4.0)), **LUMPED, hinges=1),
 }
 
 

@@ -22,8 +22,9 @@ from softrobots.compiled.chain.layout import Layout, RecursionLayout
 from softrobots.compiled.chain.looped_sides import before_by_lengths, follow_motor, given_loads, store_tip_step
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.recursion import Balance, InwardPass, TracedElement, inward, outward
+from softrobots.compiled.chain.recursion import Balance, InwardPass, inward, outward
 from softrobots.compiled.chain.routes import Routes
+from softrobots.compiled.chain.traced_elements import TracedElement, hinge
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block, TableColumns, hoist
 from softrobots.compiled.trace.expressions import Expression, Scalar
@@ -57,11 +58,16 @@ def element_kinds(plan: Plan) -> list[Kind]:
 def element_signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     """Return the properties that elements with the same code share."""
     one = unknowns.traced(row)
-    zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
     routed = unknowns.routed and unknowns.segment_at(row) is not None
     constraint = -1 if routed else unknowns.multipliers_at(row)
     muscles = [(muscle.number, muscle.twists, [arm == 0.0 for arm in muscle.arms]) for muscle in one.muscles]
-    return one.kind, one.moving, one.constraints, constraint, str(zeros), bool(np.any(one.translation != 0.0)), str(muscles)
+    return *_signature(one), constraint, str(muscles)
+
+
+def _signature(one: TracedElement) -> tuple[Any, ...]:
+    zeros = (np.asarray(one.rotation, dtype=np.float64) == 0.0).tolist()
+    members = [_signature(member) for member in one.members]
+    return one.kind, one.moving, one.constraints, str(zeros), bool(np.any(one.translation != 0.0)), str(members)
 
 
 def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
@@ -72,7 +78,7 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
     back = Block(f"inward_{infix}{number}", "Inward pass: loads and elimination.", names, trace)
     step_pass = Block(f"step_{infix}{number}", "Steps of its coordinates.", names, trace)
     columns = TableColumns(out, f"TABLE_{number}", len(rows))
-    element = _common(rows, plan, out, columns)
+    element = _common([plan.unknowns.traced(row) for row in rows], plan, out, columns)
     axes_loads = out.loads(recursion.axes, 9)
     outward_pass = outward(element, vector(axes_loads).reshape(3, 3))
     out.store_all(recursion.axes, outward_pass.end.ravel().tolist())
@@ -198,10 +204,12 @@ def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence
     return [*turn_loads, *sum_loads]
 
 
-def _common(rows: list[int], plan: Plan, block: Block, columns: TableColumns) -> TracedElement:
+def _common(ones: Sequence[TracedElement], plan: Plan, block: Block, columns: TableColumns, first: int = 0) -> TracedElement:
     """Return an element of a kind, with table entries for the numbers in which its elements differ."""
-    ones = [plan.unknowns.traced(row) for row in rows]
-    unknown = iter(block.loads(0, max(len(ones[0].moving), 1), "q"))
+    if ones[0].members:
+        alike = zip(*(one.members for one in ones), strict=True)
+        return hinge([_common(members, plan, block, columns, place) for place, members in enumerate(alike)])
+    unknown = iter(block.loads(first, max(len(ones[0].moving), 1), "q"))
     coordinates = [
         next(unknown)
         if place in ones[0].moving or not ones[0].moving

@@ -9,7 +9,8 @@ from softrobots.compiled.chain.elements import vector
 from softrobots.compiled.chain.elimination import resized
 from softrobots.compiled.chain.layout import TipLayout
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.recursion import InwardPass, TracedElement
+from softrobots.compiled.chain.recursion import InwardPass
+from softrobots.compiled.chain.traced_elements import TracedElement
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Expression
 

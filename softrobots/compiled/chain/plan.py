@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 from softrobots.compiled.chain.elements import symmetric, upper_triangle, vector
@@ -31,6 +31,10 @@ class Plan:
     """Places of the response of the tip, or to given loads and motions, in code of looped chains that traces it."""
     inputs: NumberInputs | None = None
     """The numbers of the chain that are inputs of the code; None if all are constants."""
+
+    def __post_init__(self) -> None:
+        """Join the joints of sections along which actuators wind."""
+        object.__setattr__(self, "unknowns", replace(self.unknowns, chain=self.unknowns.chain.joined))
 
     def numbers_in(self, block: Block) -> SerialChain:
         """Return the chain with expressions of a block instead of the numbers that are inputs."""

@@ -9,66 +9,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from softrobots.compiled.chain.elements import Load, Motion, Screw, constants, sliding_joint, turned, turning_joint, vector
-from softrobots.compiled.chain.elimination import Eliminated, Outboard, RouteSums, eliminate, resized
-from softrobots.compiled.chain.muscle_terms import ElementMuscle, pulls_on
+from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate, resized
+from softrobots.compiled.chain.muscle_terms import pulls_on
+from softrobots.compiled.chain.traced_elements import TracedElement
 from softrobots.compiled.trace.expressions import Scalar, if_less, smaller
 from softrobots.compiled.trace.stumpff_series import LARGEST
-
-
-class SpringLaw(NamedTuple):
-    """A spring of a hinge with two, one behind the other, whose torque depends on both angles; at given angles."""
-
-    torque: Scalar
-    """Load that it carries [N m]."""
-    stiffness: Scalar
-    """Its derivative with respect to the angle of the spring [N m/rad]."""
-    energy: Scalar
-    """Energy; the outer spring counts that of both [J]."""
-    coupling: Scalar | None
-    """Derivative of the torque with respect to the angle of the inner spring [N m/rad]; None for the inner one."""
-
-
-@dataclass
-class TracedElement:
-    """Numbers of an element: constants where they are known when the code is generated, otherwise table entries."""
-
-    kind: str
-    """`turn`, `slide` or `section`."""
-    rotation: Any
-    """Axes of its frame in those of the element before, shape (3, 3)."""
-    translation: Any
-    """Its origin there, shape (3,) [m]."""
-    bodies: list[tuple[Scalar, Any]]
-    """Mass and first moment of its bodies."""
-    mass_beyond: Scalar
-    """Mass beyond it, without its own [kg]."""
-    coordinates: list[Scalar]
-    """Joint position; section coordinates, locked ones included [rad or m]."""
-    moving: tuple[int, ...]
-    """Indices of the unknown coordinates; none for a motor."""
-    stiffness: list[Scalar]
-    """Stiffness of the unknown ones [N m/rad or N/m]."""
-    rest: list[Scalar]
-    """Rest values of those [rad or m]."""
-    muscles: list[ElementMuscle]
-    """The muscles beside it."""
-    constraints: tuple[int | None, ...]
-    """Number of the multiplier of the segment that constrains each unknown coordinate, or None."""
-    length: Scalar = 0.0
-    """Rest length of a section [m]."""
-    law: SpringLaw | None = None
-    """Law of its spring if that is not linear by itself."""
-    tensions: Sequence[Scalar] = ()
-    """Tension of each muscle of its segment [N]."""
-    preload: Sequence[Scalar] = ()
-    """Part of it that the start of the springs accounts for; with given lengths [N]."""
-    routes: RouteSums | None = None
-    """What actuators on routes add."""
 
 
 @dataclass
@@ -83,6 +33,8 @@ class OutwardPass:
     """Axes behind it, shape (3, 3)."""
     screw: Screw | None
     """Screw motion of a section."""
+    members: Sequence[OutwardPass] = ()
+    """Results of the joints of a hinge."""
 
 
 @dataclass
@@ -127,6 +79,11 @@ class InwardPass:
 
 def outward(element: TracedElement, axes: Any) -> OutwardPass:
     """Outward pass of an element; `axes` are those behind the element before."""
+    if element.members:
+        passes: list[OutwardPass] = []
+        for member in element.members:
+            passes.append(outward(member, passes[-1].end if passes else axes))
+        return replace(passes[0], end=passes[-1].end, members=passes)
     start, shift = axes @ element.rotation, axes @ element.translation
     if element.kind == "section":
         screw = Screw(element.coordinates, element.length)
@@ -230,6 +187,13 @@ def inward(
 
 def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[Load]) -> tuple[Motion, list[Load]]:
     """Return the motion of an element, and the loads with levers from its origin at zero."""
+    if element.members:
+        motions: list[Motion] = []
+        here = list(loads)
+        for member, passed in zip(element.members[::-1], outward_pass.members[::-1], strict=True):
+            motion, here = _motion(member, passed, here)
+            motions.insert(0, motion)
+        return _joined(motions), here
     if outward_pass.screw is not None:
         motion, levers = outward_pass.screw.motion(loads, element.bodies, outward_pass.start)
         own = sum((mass for mass, _ in element.bodies), 0.0)
@@ -247,6 +211,19 @@ def _motion(element: TracedElement, outward_pass: OutwardPass, loads: Sequence[L
         return turning_joint(axis, here), here
     slid = [Load(load.force, load.lever + axis * (load.share * element.coordinates[0]), load.share) for load in here]
     return sliding_joint(axis, here), slid
+
+
+def _joined(motions: Sequence[Motion]) -> Motion:
+    """Return the motion of joints, base to tip, as that of one element with all their coordinates."""
+    twists, bends, moves = (
+        np.concatenate([getattr(one, name) for one in motions], axis=1) for name in ("twists", "bends", "moves")
+    )
+    curvature = twists.T @ bends
+    for row, one in enumerate(motions):
+        curvature[row, row] = one.curvature[0, 0]
+        curvature[row, :row] = curvature[:row, row]
+    torque, weight = ([value for one in motions for value in getattr(one, name)] for name in ("torque", "weight"))
+    return Motion(twists, bends, moves, torque, weight, curvature)
 
 
 def range_margin(element: TracedElement, screw: Screw) -> Scalar:

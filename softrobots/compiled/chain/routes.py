@@ -154,8 +154,8 @@ class Routes:
         """Return element and path of every point, in the order of the tables."""
         return [(row, path) for row in self.beside for one in self.beside[row] for path in one.paths]
 
-    def tables(self, width: int) -> dict[str, object]:
-        """Return the tables of the loops, with `width` numbers of each point in their table."""
+    def tables(self) -> dict[str, object]:
+        """Return the tables of the loops."""
         count = len(self.unknowns.chain.elements)
         beside = [self.beside.get(row, ()) for row in range(count)]
         pairs, k = [one for row in beside for one in row], self.stride
@@ -170,7 +170,6 @@ class Routes:
             "MEETINGS": tuple(accumulate((k * size for size in past[:-1]), initial=self.meetings)),
             "STRIDE": k,
             "POINTS": self.points,
-            "POINT_WIDTH": width,
             "POINT_RECORD": POINT_RECORD,
             "N_COMPONENTS": self.components,
             "COMPONENT_PUSH": self.cross,

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import replace
 
-from softrobots.compiled.chain.recursion import SpringLaw, TracedElement
+from softrobots.compiled.chain.traced_elements import SpringLaw, TracedElement
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.expressions import Scalar, if_less, inverse_cube_root, larger, square_root
 from softrobots.inflated_beam.membrane_tube import softening

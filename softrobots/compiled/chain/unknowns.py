@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -12,15 +12,14 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
-from softrobots.compiled.chain.recursion import TracedElement
+from softrobots.compiled.chain.traced_elements import TracedElement, hinge
 from softrobots.compiled.settings import LARGEST_NUMBER, LARGEST_POSITION, MAX_UNROLLED_JOINTS
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, scalar
 from softrobots.constant_curvature.strain_chain import STRAINS
-from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.model.actuator_laws import ROUNDING, ActuatorLaws
-from softrobots.model.serial_chain import ChainJoint, ChainSection, SerialChain, bodies_of, strains_of
+from softrobots.model.serial_chain import ChainHinge, ChainJoint, ChainSection, Element, SerialChain, bodies_of, strains_of
 
 STRETCHED = ("elastic", "mckibben")
 """Kinds of actuators whose tension depends on the length."""
@@ -155,7 +154,20 @@ class Unknowns:
             numbers: The chain with expressions instead of some of its numbers.
         """
         chain = self.chain if numbers is None else numbers
-        element = chain.elements[row]
+        element: Element | ChainHinge = chain.elements[row]
+        if isinstance(element, ChainHinge):
+            pairs = zip(element.joints, element.masses_beyond, strict=True)
+            return hinge([self._traced(chain, joint, mass, motor, unknown) for joint, mass in pairs])
+        return replace(self._traced(chain, element, chain.masses_beyond[row], motor, unknown), muscles=self._muscles(row))
+
+    def _traced(
+        self,
+        chain: SerialChain,
+        element: Element,
+        mass_beyond: float,
+        motor: Callable[[int], Scalar],
+        unknown: Callable[[int], Scalar],
+    ) -> TracedElement:
         strains = strains_of(element)
         moving = tuple(place for place, strain in enumerate(strains) if strain in self.place)
         places = [self.place[strains[one]] for one in moving]
@@ -172,19 +184,19 @@ class Unknowns:
             rotation=constants(element.rotation),
             translation=constants(element.translation),
             bodies=[(scalar(body.mass), constants(body.first_moment)) for body in bodies_of(element)],
-            mass_beyond=scalar(chain.masses_beyond[row]),
+            mass_beyond=scalar(mass_beyond),
             coordinates=coordinates,
             moving=moving,
             stiffness=[scalar(chain.stiffness[strains[one]]) for one in moving],
             rest=[scalar(chain.rest[strains[one]]) for one in moving],
-            muscles=self._muscles(row, strains),
+            muscles=[],
             constraints=tuple(self.multiplier.get(strains[one]) for one in moving),
             length=element.length if isinstance(element, ChainSection) else 0.0,
         )
 
-    def _muscles(self, row: int, strains: tuple[int, ...]) -> list[ElementMuscle]:
+    def _muscles(self, row: int) -> list[ElementMuscle]:
         """Return the muscles beside an element."""
-        paths, segment = self.chain.muscle_paths, self.segment_at(row)
+        paths, segment, strains = self.chain.muscle_paths, self.segment_at(row), strains_of(self.chain.elements[row])
         beside: list[ElementMuscle] = []
         if segment is None or self.routed:
             return beside
@@ -219,12 +231,6 @@ class Unknowns:
         """Number of multipliers: of constrained sums, or of lengths of routed muscles."""
         return len(self.chain.actuators) if self.held_lengths else len(self.chain.constrained)
 
-    @cached_property
-    def length_softness(self) -> FloatArray:
-        """Change of each length at rest by its own tension, shape (n_muscles,) [m/N]."""
-        arms = self.chain.muscle_paths.at(self.chain.rest).arms
-        return np.asarray((arms**2 / self.chain.stiffness).sum(axis=1))
-
     @property
     def n_tensions(self) -> int:
         """Number of muscles of which an input is in the workspace: all but those that constrain sums of strains."""
@@ -255,8 +261,10 @@ class Unknowns:
     @property
     def spring_rounding(self) -> float:
         """Rounding of the torques of springs and stiff tendons [N m], see `SoftModel.rounding`."""
-        chain, strains = self.chain, list(self.strains)
-        held = float(np.linalg.norm(chain.muscle_paths.rest / self.length_softness)) * ROUNDING if self.held_lengths else 0.0
+        chain, strains, held = self.chain, list(self.strains), 0.0
+        if self.held_lengths:  # rounding of each length, over its change by its own tension
+            softness = (chain.muscle_paths.at(chain.rest).arms ** 2 / chain.stiffness).sum(axis=1)
+            held = float(np.linalg.norm(chain.muscle_paths.rest / softness)) * ROUNDING
         return (
             held
             + ActuatorLaws(chain.actuators).rounding

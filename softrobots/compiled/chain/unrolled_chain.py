@@ -15,8 +15,9 @@ import numpy as np
 from softrobots.compiled.chain.elements import Load, Vector, constants, turned, vector
 from softrobots.compiled.chain.elimination import Outboard, resized
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.recursion import Balance, InwardPass, OutwardPass, TracedElement, inward, outward
+from softrobots.compiled.chain.recursion import Balance, InwardPass, OutwardPass, inward, outward
 from softrobots.compiled.chain.slack_hinges import with_slack_hinges
+from softrobots.compiled.chain.traced_elements import TracedElement
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, scalar

@@ -64,11 +64,10 @@ def held_motion(unknowns: Unknowns) -> HeldMotion:
     shares, slopes = [], []
     for segment in unknowns.segments:
         muscles = sorted(segment.muscles)
-        left, values, right = np.linalg.svd(chain.spread[np.ix_(strains, muscles)], full_matrices=False)
-        rank = int((values > _RANK * values.max(initial=0.0)).sum())
-        rows = np.zeros((rank, len(chain.actuators)))
-        rows[:, muscles] = right[:rank]
-        shares.append(left[:, :rank] * values[:rank])
+        columns, own = held_factors(chain.spread[np.ix_(strains, muscles)])
+        rows = np.zeros((len(own), len(chain.actuators)))
+        rows[:, muscles] = own
+        shares.append(columns)
         slopes.append(rows)
     return HeldMotion(
         moving,
@@ -78,6 +77,13 @@ def held_motion(unknowns: Unknowns) -> HeldMotion:
         _clean(np.concatenate(slopes)),
         _are_linear(chain.muscle_paths, strains),
     )
+
+
+def held_factors(spread: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return `W` and `P`, shapes (n, c) and (c, m), of strains by the lengths of a segment, shape (n, m)."""
+    left, values, right = np.linalg.svd(spread, full_matrices=False)
+    rank = int((values > _RANK * values.max(initial=0.0)).sum())
+    return left[:, :rank] * values[:rank], right[:rank]
 
 
 def _are_linear(paths: MusclePaths, strains: list[int]) -> bool:

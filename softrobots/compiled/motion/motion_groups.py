@@ -12,7 +12,8 @@ import numpy as np
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.looped_chain import element_signature, table_element
 from softrobots.compiled.chain.muscle_terms import pulls_on
-from softrobots.compiled.chain.recursion import TracedElement, range_margin
+from softrobots.compiled.chain.recursion import range_margin
+from softrobots.compiled.chain.traced_elements import TracedElement
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import CompositeBody, JointState, RigidBody, SectionState, joint_state, round_part
@@ -63,6 +64,8 @@ class MovingGroup:
         """From its end to the beginning of the next group, or to the tip, in the axes of its end [m]."""
         half, quarter = (one * (1.0 / plan.massive(block)) for one in plan.factors(block))
         place, routes = 0, plan.routes
+        beside = [] if routes is None else [routes.unknowns.moving(row) for row in routes.routes.beside]
+        within = {strain: number for strains in beside for number, strain in enumerate(strains)}
         for rows in zip(*groups, strict=True):
             ones = [unknowns.traced(row) for row in rows]
             element = replace(table_element(ones, columns), rotation=columns.entries([parts[row].rotation for row in rows]))
@@ -83,11 +86,12 @@ class MovingGroup:
                 torque = (coordinates[axis] - rest[number]) * stiffness
                 if routes is None or not routes.held:  # else dampers act on the free coordinates
                     torque = torque + damping * rates[axis]
-                if routes is not None and rows[0] in routes.routes.beside:
+                column = within.get(unknowns.moving(rows[0])[number])
+                if routes is not None and column is not None:
                     torque = torque + block.load(routes.pulls + place, "q")
-                    for other in range(number + 1) if not routes.held else ():
-                        pair = place - number + other, place
-                        at = routes.curvatures + len(unknowns.strains) * number + pair[0]
+                    for row in range(column + 1) if not routes.held else ():
+                        pair = place - column + row, place
+                        at = routes.curvatures + len(unknowns.strains) * column + pair[0]
                         self.curvatures[pair] = block.load(at, "q")
                 self.torques.append(torque)
                 place += 1
@@ -142,11 +146,18 @@ def motion_groups(unknowns: Unknowns) -> list[tuple[int, ...]]:
     """Return the elements of each group behind the leading motors, base to tip."""
     groups: list[tuple[int, ...]] = []
     before = -2  # place of the spring joint before, if it is one
+    first = {row for row, _ in unknowns.chain.wound}  # the joints of a section along which routes wind stay together
     for row in range(unknowns.leading_motors, len(unknowns.chain.elements)):
         one = unknowns.traced(row)
         spring = one.kind != "section" and unknowns.motor(row) is None
         place = unknowns.place[unknowns.moving(row)[0]] if spring else -2
-        if spring and place == before + 1 and not np.any(one.translation != 0.0) and len(groups[-1]) < _MOST_JOINTS:
+        if (
+            spring
+            and place == before + 1
+            and row not in first
+            and not np.any(one.translation != 0.0)
+            and len(groups[-1]) < _MOST_JOINTS
+        ):
             groups[-1] = (*groups[-1], row)
         else:
             groups.append((row,))
@@ -213,9 +224,10 @@ def group_signature(unknowns: Unknowns, row: int, parts: ElementParts) -> tuple[
     """Return the properties that elements with the same code share."""
     rounds = [part and part[0] for part in (round_part(body.inertia) for body in parts.bodies)]
     segment, (kind, moving, *_, muscles) = unknowns.segment_at(row), element_signature(unknowns, row)
+    wound = any(first <= row <= last for first, last in unknowns.chain.wound)
     pulled = segment and (unknowns.routed or segment.muscles)
     zeros = [(array == 0.0).tolist() for array in (parts.rotation, parts.reach)]
-    return kind, moving, muscles, str(rounds), pulled, str(zeros), str(parts.turn.tolist())
+    return kind, moving, muscles, str(rounds), pulled, wound, str(zeros), str(parts.turn.tolist())
 
 
 def reach_behind(unknowns: Unknowns, row: int) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 from softrobots.compiled.chain.layout import assign_places
@@ -162,8 +162,8 @@ class MotionPlan:
     @cached_property
     def routes(self) -> MotionRoutes | None:
         """Places of actuators on routes and of the strains that they hold; None without any."""
-        layout = self.layout
-        return MotionRoutes(self.unknowns, layout.prepared, 2 if layout.in_stages else 1) if self.unknowns.routed else None
+        layout, joined = self.layout, replace(self.unknowns, chain=self.unknowns.chain.joined)
+        return MotionRoutes(joined, layout.prepared, 2 if layout.in_stages else 1) if joined.routed else None
 
     @property
     def strains(self) -> tuple[int, int, int, int]:

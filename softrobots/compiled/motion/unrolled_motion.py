@@ -20,8 +20,8 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, cross, turned, turned_by, vector
-from softrobots.compiled.chain.recursion import TracedElement
 from softrobots.compiled.chain.slack_hinges import with_slack_hinges
+from softrobots.compiled.chain.traced_elements import TracedElement
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import CompositeBody
 from softrobots.compiled.trace.blocks import Block

@@ -167,9 +167,12 @@ def _along_routes(plan: Plan) -> tuple[list[Block], list[tuple[str, str]], dict[
     for name, form in route_forms(plan).items():
         added, columns = length_blocks(plan, name, form)
         blocks += added + component_blocks(plan, name, form)
-        loops += [(LENGTHS if columns else PULLS, name), (components_text(held=plan.unknowns.held_lengths), name)]
+        loops += [
+            (LENGTHS.replace("POINT_WIDTH", str(columns.width)) if columns else PULLS, name),
+            (components_text(held=plan.unknowns.held_lengths), name),
+        ]
         if columns:
-            tables |= plan.routes.tables(columns.width) | {"POINT_TABLE": tuple(columns.numbers)}
+            tables |= plan.routes.tables() | {f"POINT_TABLE_{name}": tuple(columns.numbers)}
     return blocks, loops, tables
 
 

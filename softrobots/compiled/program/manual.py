@@ -132,7 +132,7 @@ def motor_names(unknowns: Unknowns) -> str:
 def strain_names(unknowns: Unknowns) -> str:
     """Return the names of the unknowns."""
     names: dict[int, str] = {}
-    for element in unknowns.chain.elements:
+    for element in (one for row in unknowns.chain.elements for one in getattr(row, "joints", (row,))):
         if isinstance(element, ChainSection):
             names |= {strain: f"{element.name} {STRAINS[place]}" for place, strain in enumerate(strains_of(element))}
         elif element.strain is not None:

@@ -53,7 +53,7 @@ class ActuatorParts:
 
 def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
     """Trace the functions of the actuators of a looped chain."""
-    unknowns, own, held = plan.unknowns, routes.routes, routes.held
+    unknowns, own, held = routes.unknowns, routes.routes, routes.held
     forms = route_forms(routes)
     strain, rate, *_ = plan.strains
     blocks: list[Block] = []
@@ -62,10 +62,11 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
     for name, form in forms.items():
         added, columns = length_blocks(routes, name, form, routes.swerving if held else None)
         blocks += [*added, *form_blocks(routes, name, form)]
-        before += [(LENGTHS if columns else PULLS, name), (arms_text(name), name)]
-        before += [(SWERVE if columns else _NO_SWERVE, name)] if held else []
+        texts = [LENGTHS, SWERVE] if columns else [PULLS, _NO_SWERVE]
+        texts = [text.replace("POINT_WIDTH", str(columns.width)) if columns else text for text in texts[: 1 + held]]
+        before += [(text, name) for text in (*texts, arms_text(name))]
         if columns:
-            tables |= own.tables(columns.width) | {"POINT_TABLE": tuple(columns.numbers)}
+            tables |= own.tables() | {f"POINT_TABLE_{name}": tuple(columns.numbers)}
     named = {form: (number, name) for number, (name, form) in enumerate(forms.items())}
     calls: dict[str, list[tuple[int, str]]] = {"follow": [], "swerve": []} if held else {"follow": [], "pull": []}
     for number, name in named.values():

@@ -14,6 +14,7 @@ from softrobots.compiled.chain.elimination import Outboard, eliminate_multiplier
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.routes import Routed
 from softrobots.compiled.chain.unknowns import Segment
+from softrobots.compiled.motion.held_motion import held_factors
 from softrobots.compiled.settings import LARGEST_NUMBER
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, smaller
@@ -97,56 +98,60 @@ def held_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block],
     """Trace the functions at the base of a segment that eliminate given lengths, and solve for the changes of their tensions.
 
     What closing the gaps saves counts in the energy: the tension that the step leads to times the gap, as in Fletcher's penalty
-    function, and the elastic energy of the gap.
+    function, and the elastic energy of the gap. Lengths that depend on each other hold as many combinations of them as the
+    robot can choose, with tensions in the same proportions.
 
     Returns:
         The functions, and the size of their record.
     """
     routes, recursion, layout, tip = plan.routes, plan.recursion, plan.layout, plan.tip
-    count, all_, softness = len(segment.stretched), routes.components, plan.unknowns.length_softness[list(segment.stretched)]
+    chain, muscles, all_ = plan.unknowns.chain, list(segment.stretched), routes.components
+    shares = held_factors(chain.spread[:, muscles])[1]
+    shares = np.eye(len(muscles)) if len(shares) == len(muscles) else shares
+    softness = ((shares @ chain.muscle_paths.at(chain.rest).arms[muscles]) ** 2 / chain.stiffness).sum(axis=1)
+    count, shares = len(muscles), constants(shares)
     eliminate = Block(f"eliminate_lengths_{plan.infix}{number}", "Eliminate the given lengths of a segment.", ("at",))
     inner, state = plan.load_outboard(eliminate, 3)
     cross = vector(eliminate.loads(routes.cross, 3 * count)).reshape(count, 3)
     square = vector(eliminate.loads(routes.square, all_ * all_)).reshape(all_, all_)[:count, :count]
-    sums = [eliminate.loads(routes.sums + all_ * side, count) for side in range(len(plan.turns))]
-    matrix = np.block([[inner.matrix, cross.T], [cross, square]])
-    columns = [vector([*one, *own]) for one, own in zip(inner.columns, sums, strict=True)]
-    gaps: list[Scalar] = [0.0] * count
+    sums = [vector(eliminate.loads(routes.sums + all_ * side, count)) for side in range(len(plan.turns))]
+    matrix = np.block([[inner.matrix, (shares @ cross).T], [shares @ cross, shares @ square @ shares.T]])
+    columns = [vector([*one, *(shares @ own)]) for one, own in zip(inner.columns, sums, strict=True)]
+    gaps = constants(np.zeros(len(shares)))
     if tip is None:
-        rest = plan.unknowns.chain.muscle_paths.rest
-        gaps = [
-            eliminate.load(routes.changes + one) - (eliminate.load(layout.actuators + one) - float(rest[one]))
-            for one in segment.stretched
-        ]
+        given_lengths = [eliminate.load(layout.actuators + one) - float(chain.muscle_paths.rest[one]) for one in muscles]
+        gaps = shares @ (vector([eliminate.load(routes.changes + one) for one in muscles]) - vector(given_lengths))
     whole = Outboard(matrix, columns, inner.min_pivot, inner.n_negative_pivots)
-    given = plan.given_gaps(eliminate, segment.stretched)
+    given = [shares @ vector(one) for one in plan.given_gaps(eliminate, muscles)]
     eliminated, beyond = eliminate_multipliers(whole, gaps, softness.tolist(), *given)
     plan.store_outboard(eliminate, beyond)
-    eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, beyond.n_negative_pivots])
+    negative = beyond.n_negative_pivots + float(count - len(shares))  # one of each length is expected
+    eliminate.store_all(recursion.sums + 3, [beyond.min_pivot, negative])
     solve = Block(f"solve_lengths_{plan.infix}{number}", "Find the tensions that hold given lengths.", ("at",), eliminate.trace)
     turns = [solve.loads(place, 3) for place in plan.turns]
-    changes = [eliminated.steps(side, vector(turn)).tolist() for side, turn in enumerate(turns)]
+    changes = [eliminated.steps(side, vector(turn)) for side, turn in enumerate(turns)]
     for side, change in enumerate(changes):
-        solve.store_all(routes.turns + all_ * side, change)
-    held = [solve.load(layout.held + muscle) for muscle in segment.stretched]
+        solve.store_all(routes.turns + all_ * side, (shares.T @ change).tolist())
+    held = vector([solve.load(layout.held + muscle) for muscle in muscles])
     arriving = [one for turn in turns for one in turn]
     if tip is None:
         arriving += [solve.load(recursion.sums), *solve.loads(recursion.steps, 2)]
         energy: Scalar = arriving[-3]
         slope: Scalar = arriving[-2]
         error: Scalar = arriving[-1]
-        for muscle, old, change, gap, soft in zip(segment.stretched, held, changes[0], gaps, softness, strict=True):
-            new, torque = old + change, gap * float(1.0 / soft)
-            energy = energy + gap * (new + torque * 0.5)
+        for old, change, gap, soft in zip(shares @ held, changes[0], gaps, softness, strict=True):
+            torque = gap * float(1.0 / soft)
+            energy = energy + gap * (old + change + torque * 0.5)
             slope = slope - gap * (change + torque)
             error = error + torque * torque
+        for muscle, new in zip(muscles, held + shares.T @ changes[0], strict=True):
             solve.store(layout.held + muscle, if_less(absolute(new), LARGEST_NUMBER, new, 0.0))
         solve.store(recursion.sums, energy)
         solve.store_all(recursion.steps, [slope, error])
     else:
         places = [tip.constraint_loads, *tip.each(tip.constraint_columns, tip.n_constraints)]
         for place, column in zip(places, changes, strict=True):
-            for muscle, value in zip(segment.stretched, column, strict=True):
+            for muscle, value in zip(muscles, shares.T @ column, strict=True):
                 solve.store(place + muscle, value)
     crossing = [*cross.ravel(), *square.ravel(), *(one for side in sums for one in side)]
     size = hoist([solve], eliminate, arriving, 0, "at", overwritten=[*state, *crossing])

@@ -96,5 +96,5 @@ def around(name: str, form: str, infix: str) -> tuple[list[str], list[str]]:
 
 
 def loops_of(text: str, form: str, suffix: str) -> str:
-    """Return loops for a form of elements; those of batches end in the suffix."""
+    """Return loops for a form of elements; those of batches end in the suffix, `POINT_WIDTH` has been replaced."""
     return text.replace("_FORM", f"_{form}{suffix}")

@@ -21,7 +21,7 @@ from softrobots.compiled.chain.elements import is_zero, outer, upper_triangle, v
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.routes import Routed
 from softrobots.compiled.trace.blocks import Block, TableColumns
-from softrobots.compiled.trace.expressions import Scalar, larger, smaller, square_root
+from softrobots.compiled.trace.expressions import Scalar, if_less, larger, smaller, square_root
 from softrobots.model.serial_chain import strains_of
 
 SHORTEST = 1e-3
@@ -32,7 +32,7 @@ class Form(NamedTuple):
     """Elements of routed segments that have the same unknowns."""
 
     section: bool
-    """Whether they are sections; else joints, of lumped sections where there are actuators beside them."""
+    """Whether they are sections or hinges; else joints, of lumped sections where all actuators beside them run straight."""
     moving: tuple[int, ...]
     """Indices of their unknown coordinates."""
 
@@ -45,6 +45,8 @@ class _Point(NamedTuple):
     turned: Scalar
     around: Any
     radial: Any
+    separable: Scalar
+    """1 if it is of a straight route along a lumped section, whose length is taken to second order."""
     locked: Sequence[Scalar]
     """Values of the coordinates that are not unknown."""
 
@@ -52,7 +54,7 @@ class _Point(NamedTuple):
 def form_of(plan: Routed, row: int) -> Form:
     """Return the form of an element of a routed segment."""
     one = plan.unknowns.traced(row)
-    return Form(one.kind == "section", one.moving)
+    return Form(one.kind in ("section", "hinge"), one.moving)
 
 
 def route_forms(plan: Routed) -> dict[str, Form]:
@@ -77,11 +79,13 @@ def length_blocks(plan: Routed, name: str, form: Form, swerving: int | None = No
     begin = Block(f"clear_pulls_{name}", "Clear the sums over the actuators beside an element.")
     begin.store_all(routes.load, [0.0] * k)
     begin.store_all(routes.curvature, [0.0] * (k * (k + 1) // 2))
-    paths = plan.routes.paths()
-    if not any(form_of(plan, row) == form for row, _ in paths):
+    rows = {row for row in routes.beside if form_of(plan, row) == form}
+    own = [pair for pair in routes.paths() if pair[0] in rows]
+    if not own:
         return [clear, load, begin], None
+    paths = [pair if pair[0] in rows else own[0] for pair in routes.paths()]  # the other rows of the table are not read
     add = Block(f"add_length_{name}", "Add a point to length and slopes of an actuator.", ("row", "q", "at", "number", "point"))
-    columns = TableColumns(add, "POINT_TABLE", len(paths))
+    columns = TableColumns(add, f"POINT_TABLE_{name}", len(paths))
     point = _point(plan, form, paths, columns)
     if form.section:
         _add_section_point(plan, form, add, point)
@@ -129,27 +133,37 @@ def _point(plan: Routed, form: Form, paths: Sequence[tuple[int, int]], columns: 
         columns.entries(turns)[0],
         around,
         radial,
+        columns.entry([float(given.separable[path]) for path in numbers]),
         [0.0 if place in form.moving else columns.entry([one[place] for one in locked]) for place in range(len(locked[0]))],
     )
 
 
 def _add_section_point(plan: Routed, form: Form, block: Block, point: _Point) -> None:
-    """Trace length and slopes of a point beside a section, and keep the direction of the tangent, and one over its length."""
+    """Trace length and slopes of a point beside a section, and keep the direction of the tangent, and one over its length.
+
+    That of a separable one is the direction at rest.
+    """
     routes, z = plan.routes, vector(point.locked)
     z[list(form.moving)] = block.loads(0, len(form.moving), "q")
     ahead = point.arms @ z
     along, around, radial = ahead + point.length, point.around @ z + point.turned, point.radial @ z
     across = around * around + radial * radial
-    size = along if is_zero(across) else square_root(along * along + across)
+
+    def either(straight: Scalar, other: Scalar) -> Scalar:
+        return if_less(0.5, point.separable, straight, other)
+
+    size = either(point.length, along if is_zero(across) else square_root(along * along + across))
     back = 1.0 / size
-    excess = 0.0 if is_zero(across) else across / (size + larger(along, 0.0))
-    direction = [along * back, around * back, radial * back]
+    excess: Scalar = 0.0
+    if not is_zero(across):
+        excess = (across - point.turned * point.turned) / (size + either(size, larger(along, 0.0)))
+    direction = [either(1.0, along * back), around * back, radial * back]
     slopes = point.arms * direction[0] + point.around * direction[1] + point.radial * direction[2]
     block.store(routes.lengths, block.load(routes.lengths, "number") + (ahead + excess), "number")
     for place, axis in enumerate(form.moving):
         block.store(place, block.load(place, "at") + slopes[axis], "at")
-    block.store(routes.margin, smaller(block.load(routes.margin), along - point.length * SHORTEST))
-    block.store_all(0, [*direction, back], "point")
+    block.store(routes.margin, smaller(block.load(routes.margin), either(1.0, along - point.length * SHORTEST)))
+    block.store_all(0, [direction[0], either(0.0, direction[1]), direction[2], back], "point")
 
 
 def _second(form: Form, block: Block, point: _Point) -> Any:
