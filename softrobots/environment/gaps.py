@@ -63,7 +63,7 @@ class Gaps:
         """Distances of the core points from the obstacles, shape (m,) [m]."""
         self.values: FloatArray = found.distances - self.radii
         """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
-        self._cores, self.places, self.parts, self._transforms, self._reach = cores, places, found.parts, transforms, reach
+        self._cores, self.places, self.parts, self._transforms, self.reach = cores, places, found.parts, transforms, reach
         self._own = own
         self.moves: FloatArray = cores.moves.take(found.capsules, 0)
         """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
@@ -143,7 +143,7 @@ class Gaps:
             by_moment=None,
             gravity_derivative=None,
             potential=-float(vectors.ravel().dot(points.ravel())),
-            scale=self._reach * sum(map(math.hypot, *vectors.T.tolist())),
+            scale=self.reach * sum(map(math.hypot, *vectors.T.tolist())),
         )
 
     def curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
