@@ -75,10 +75,11 @@ class ContactWalk:
             self.work += there.work
             if there.statuses != here.statuses:
                 self._share, changed, self._waits = 2.0 * (aim - place), math.inf, False
-            elif aim >= changed:  # in a smaller step from here they stay
-                changed = math.inf
-            elif changed == math.inf and not self._waits:
-                self._share = min(2.0 * self._share, 1.0)
+            else:
+                if aim >= changed:  # in a smaller step from here they stay
+                    changed = math.inf
+                if not self._waits:
+                    self._share = min(2.0 * self._share, 1.0)
             here, place, self._waits = there, aim, False
         return here
 
