@@ -443,7 +443,7 @@ def test_a_stretched_arm_bends_aside_where_a_wall_is_too_near(arm: sr.SoftModel)
 def test_a_contact_where_two_capsules_meet_is_told_once_and_with_its_force() -> None:
     """A ball pressed on the middle of a section; its force is the derivative of the energy by the way of the ball.
 
-    The nearest point is 2.5e-6 m beside the end that the halves of the section share, where gaps are below 1e-9 of the reach, too.
+    The nearest point is 2.5e-6 m beside the end that the halves of the section share, where gaps are zero within the tolerance.
     """
     rod, way, step = sr.load_model(sr.PccArm()), np.cross([0.0, 0.0, 1.0], [0.3, 1.0, 0.2]), 1e-6
     way /= np.linalg.norm(way)

@@ -364,7 +364,7 @@ def test_what_is_refused_says_why(case: str) -> None:
 
 
 def test_a_contact_that_sticks_only_in_small_steps_holds_nothing_up(arm: sr.SoftModel) -> None:
-    """A tip pulled down a wall into a second one: a large step tells another status there than the small one that ends at it."""
+    """A tip is pulled down a wall into a second one: a large step tells another status than the small one that ends there."""
     corner = sr.Environment([sr.HalfSpace((-1, 0, 0), -1.0), sr.HalfSpace((0, -1, 0), -0.1)])
     pulls = np.outer(np.linspace(0.0, 1.0, 8), (0.0, 2.0, -30.0))
     path = sr.follow_contact(arm, (0.1, 0.9, -0.4), pulls, environment=corner, friction=2.0)

@@ -110,9 +110,9 @@ def _near(
     values, normals = field.at(ends.reshape(-1, 3), other.repeat(2))
     known = values.reshape(-1, 2), normals.reshape(-1, 2, 3)
     chosen = ((known[0] <= most[:, None]) & counted).ravel().nonzero()[0]
-    pair = chosen >> 1
+    pair, points = chosen >> 1, ends.reshape(-1, 3).take(chosen, 0)
     which = other.take(pair)
-    at_ends = (one.take(pair), which, chosen & 1, ends.reshape(-1, 3).take(chosen, 0), values.take(chosen), normals.take(chosen, 0))
+    at_ends = one.take(pair), which, chosen & 1, points, values.take(chosen), normals.take(chosen, 0)
     inner = core_points(field, other, ends[:, 0], places.spans.take(one, 0), most, merged, known)
     if not len(inner.pairs):
         return Candidates([(field, which)], *at_ends)
