@@ -128,7 +128,7 @@ def _own(
     """Candidates between the robot's own capsules, which are obstacles after the `count` of the environment."""
     field = own_capsules(cores, places)
     near = near_pairs(cores, places, pairs, margin)
-    found = _near(field, places, *near.T, np.True_, limits, merged)
+    found = _near(field, places, near[:, 0], near[:, 1], np.True_, limits, merged)
     ends = (found.features < INSIDE).nonzero()[0]
     numbers = cores.end_numbers[found.capsules[ends], found.features[ends]]
     found.capsules[ends], found.features[ends] = cores.end_capsules[numbers], cores.end_features[numbers]

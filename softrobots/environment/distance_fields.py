@@ -87,7 +87,7 @@ class HalfSpaces(NamedTuple):
         return np.zeros((len(starts), 0))
 
 
-def _of(values: FloatArray, which: Any) -> FloatArray:
+def _of(values: Any, which: Any) -> Any:
     """Values of the body of each point; of a single body once for all points."""
     return values if len(values) == 1 else values.take(which, 0)
 
