@@ -370,11 +370,11 @@ def test_equilibria_in_contact_are_compared_with_mujoco(tool: Callable, monkeypa
     scene = contact_jobs.leaning_arm(2)
     monkeypatch.setattr(contact_jobs, "TIME_STEPS", (0.002, 0.01))
     monkeypatch.setattr(contact_jobs, "LARGE_STEPS", ())
-    monkeypatch.setattr(contact_jobs, "leaning_arm", lambda count: scene._replace(dampings=(16.0,)))
+    monkeypatch.setattr(contact_jobs, "leaning_arm", lambda count, on="wall": scene._replace(dampings=(16.0,)))
     monkeypatch.setattr(contact_jobs, "lying_rod", lambda count, sections: scene._replace(dampings=(16.0,), name="again"))
     results = measure(QUICK, ["contact"])
-    assert [row.skipped for row in results.rows] == [""] * 18
-    assert [row.target for row in results.rows] == 2 * [5e-4, 5e-4, 20.0, None, None, None, 20.0, 20.0, 20.0]
+    assert [row.skipped for row in results.rows] == [""] * 20
+    assert [row.target for row in results.rows] == 2 * [5e-4, 5e-4, 20.0, None, None, None, 20.0, 20.0, 20.0] + 2 * [5e-4]
     assert sum("time step 0.01 s" in note for note in results.notes) == 4
     monkeypatch.setattr(contact_jobs, "FORCE_TOLERANCE", 3e-6)
     assert sum("time step 0.002 s" in note for note in measure(QUICK, ["contact"]).notes) == 4

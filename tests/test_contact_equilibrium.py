@@ -438,3 +438,21 @@ def test_a_stretched_arm_bends_aside_where_a_wall_is_too_near(arm: sr.SoftModel)
     assert contact.normal_force == pytest.approx(buckling, rel=nearer)  # 1 + O(shortening)
     with pytest.raises(sr.EquilibriumNotFound, match=r"'link_1_root' is .* inside of 'ball', wherever the springs are"):
         sr.solve_equilibrium(arm, (0, 0.9, -0.4), environment=sr.Environment([sr.Sphere(0.05, (0, 0, 0.02), name="ball")]))
+
+
+def test_a_contact_where_two_capsules_meet_is_told_once_and_with_its_force() -> None:
+    """A ball pressed on the middle of a section; its force is the derivative of the energy by the way of the ball.
+
+    The nearest point is 2.5e-6 m beside the end that the halves of the section share, where gaps are zero within the tolerance.
+    """
+    rod, way, step = sr.load_model(sr.PccArm()), np.cross([0.0, 0.0, 1.0], [0.3, 1.0, 0.2]), 1e-6
+    way /= np.linalg.norm(way)
+
+    def pressed(depth: float) -> sr.Equilibrium:
+        ball = sr.Sphere(0.02, (0.0, 0.0, 0.5895) + (0.07 - depth) * way)
+        return sr.solve_equilibrium(rod, rod.relaxed_motors, environment=sr.Environment([ball]))
+
+    (contact,) = pressed(1e-3).contacts
+    energies = [0.5 * rod.stiffness @ (pressed(1e-3 + change).q_springs - rod.rest) ** 2 for change in (step, -step)]
+    assert contact.strict
+    assert contact.normal_force == pytest.approx((energies[0] - energies[1]) / (2.0 * step), rel=1e-5)  # rounding over the step

@@ -361,3 +361,12 @@ def test_what_is_refused_says_why(case: str) -> None:
     call, words = REFUSED[case]
     with pytest.raises(sr.ParameterError, match=words):
         call()
+
+
+def test_a_contact_that_sticks_only_in_small_steps_holds_nothing_up(arm: sr.SoftModel) -> None:
+    """A tip is pulled down a wall into a second one: a large step tells another status than the small one that ends there."""
+    corner = sr.Environment([sr.HalfSpace((-1, 0, 0), -1.0), sr.HalfSpace((0, -1, 0), -0.1)])
+    pulls = np.outer(np.linspace(0.0, 1.0, 8), (0.0, 2.0, -30.0))
+    path = sr.follow_contact(arm, (0.1, 0.9, -0.4), pulls, environment=corner, friction=2.0)
+    assert len(path.equilibria) == len(pulls)
+    assert [contact.status for contact in path.equilibria[-1].contacts] == ["sticks", "sticks"]

@@ -196,7 +196,7 @@ def test_two_faces_that_meet_at_a_corner_alone_are_a_corner() -> None:
     for x, y in ((0.0, 0.0), (0.05, 0.0), (0.0, -0.05)):
         point = np.array([[x, y, 1.5]])
         distance, normal = field.at(point, np.zeros(1, dtype=int))
-        directions, weights = field.curvature(point, np.zeros(1, dtype=int))
+        directions, weights = field.curvature(point, np.zeros(1, dtype=int), distance, normal)
         away = np.array([x, y, 0.5])
         assert distance[0] == pytest.approx(np.linalg.norm(away), abs=1e-15)
         expected = (np.eye(3) - np.outer(normal[0], normal[0])) / distance[0]

@@ -53,26 +53,33 @@ def find_candidates(
         The candidates.
     """
     ends = places.ends.reshape(-1, 3).take(cores.single_ends, 0)
-    limits = margin + cores.radii
-    end_limits = limits.take(cores.end_capsules)[:, None]
+    limits, ways = margin + cores.radii, 2.0 * margin + cores.ways
     found: list[Candidates] = []
     for field, numbers in fields:
         distances = field.at_least(ends)
-        touching = distances <= end_limits
-        if len(cores.at_base):
-            _leave_out_base(touching, field, cores, ends, distances)
+        standing = _standing(field, cores, ends, distances) if len(cores.at_base) else None
         if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
+            touching = distances <= limits.take(cores.end_capsules)[:, None]
+            if standing is not None:
+                touching &= ~standing
             near, which = touching.nonzero()
             values = distances.take(near * len(numbers) + which)
-            new = _ends(field, cores, ends, near, which, values, field.normals.take(which, 0))
+            capsules, features = cores.end_capsules.take(near), cores.end_features.take(near)
+            normals = field.normals.take(which, 0)
+            new = Candidates([(field, which)], capsules, which, features, ends.take(near, 0), values, normals)
         else:
             # the distance changes by at most the length of the way: what is far at both ends is far between them
-            far = distances.take(cores.end_numbers, 0).sum(axis=1) > (2.0 * limits + cores.long_ways)[:, None]
-            new = _near(field, cores, places, ends, touching, (~far).nonzero(), limits, merged)
+            near, which = (np.add.reduce(distances.take(cores.end_numbers, 0), 1) <= ways[:, None]).nonzero()
+            if not len(near):
+                continue
+            counted = cores.counted.take(near, 0)
+            if standing is not None:
+                counted &= ~standing[cores.end_numbers[near], which[:, None]]
+            new = _near(field, places, near, which, counted, limits, merged)
         if len(new.capsules):
             found.append(Candidates(new.parts, new.capsules, numbers.take(new.obstacles), *new[3:]))
     if pairs is not None:
-        found.append(_own(cores, places, pairs, ends, limits, margin, merged, sum(len(numbers) for _, numbers in fields)))
+        found.append(_own(cores, places, pairs, limits, margin, merged, sum(len(numbers) for _, numbers in fields)))
     if len(found) == 1:
         return found[0]
     if not found:
@@ -81,72 +88,50 @@ def find_candidates(
     return Candidates(parts, *(np.concatenate(column) for column in zip(*(one[1:] for one in found), strict=True)))
 
 
-def _leave_out_base(touching: Any, field: Field, cores: Cores, ends: FloatArray, distances: FloatArray) -> None:
-    """Clear `touching`, shape (ends, bodies), where an end is `at_base`, and the end there is inside of the body.
+def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArray) -> Any:
+    """Where an end is `at_base`, and the end there is inside of a body, truth values, shape (ends, bodies); None if nowhere.
 
     There the robot stands on the body, with a flat end: its capsules have caps, which are no contact.
     """
     rows, which = (distances.take(cores.bases, 0) < cores.base_radii).nonzero()
-    if len(rows):  # `distances` are lower bounds
-        inside = field.at(ends[cores.bases[rows]], which)[0] < cores.base_radii[rows, 0]
-        touching[cores.at_base[rows[inside]], which[inside]] = False
-
-
-def _ends(
-    field: Field, cores: Cores, ends: FloatArray, near: Any, which: Any, values: FloatArray, normals: FloatArray
-) -> Candidates:
-    """Ends `near` with their distances from the bodies `which`, and normals."""
-    capsules, features = cores.end_capsules.take(near), cores.end_features.take(near)
-    return Candidates([(field, which)], capsules, which, features, ends.take(near, 0), values, normals)
+    if not len(rows):  # `distances` are lower bounds
+        return None
+    inside = field.at(ends[cores.bases[rows]], which)[0] < cores.base_radii[rows, 0]
+    standing = np.zeros(distances.shape, dtype=bool)
+    standing[cores.at_base[rows[inside]], which[inside]] = True
+    return standing
 
 
 def _near(
-    field: Field,
-    cores: Cores,
-    places: CorePlaces,
-    ends: FloatArray,
-    touching: Any,
-    pairs: Any,
-    limits: FloatArray,
-    merged: float,
+    field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, limits: FloatArray, merged: float
 ) -> Candidates:
-    """Candidates at ends where `touching`, shape (ends, bodies), and inside of cores for `pairs` of core and body."""
-    (one, other), needed = pairs, touching
-    both = cores.end_numbers.take(one, 0), other[:, None]
-    if len(one):
-        needed = touching.copy()
-        needed[both] = True
-    near, which = needed.nonzero()
-    values, normals = field.at(ends.take(near, 0), which)
-    close = touching[near, which] & (values <= limits.take(cores.end_capsules.take(near)))
-    chosen = close.nonzero()[0]
-    at_ends = near.take(chosen), which.take(chosen), values.take(chosen), normals.take(chosen, 0)
-    found = _ends(field, cores, ends, *at_ends)
-    if not len(one):
-        return found
-    place = np.zeros(needed.shape, dtype=np.intp)
-    place[near, which] = np.arange(len(near))
-    known = values.take(place[both]), normals.take(place[both], 0)
-    starts, spans = places.ends[:, 0].take(one, 0), places.spans.take(one, 0)
-    inner = core_points(field, other, starts, spans, limits.take(one), merged, known)
+    """Candidates of pairs of core and body: ends where `counted`, shape (m, 2), truth values, and what is between them."""
+    most, ends = limits.take(one), places.ends.take(one, 0)
+    values, normals = field.at(ends.reshape(-1, 3), other.repeat(2))
+    known = values.reshape(-1, 2), normals.reshape(-1, 2, 3)
+    chosen = ((known[0] <= most[:, None]) & counted).ravel().nonzero()[0]
+    pair, points = chosen >> 1, ends.reshape(-1, 3).take(chosen, 0)
+    which = other.take(pair)
+    at_ends = one.take(pair), which, chosen & 1, points, values.take(chosen), normals.take(chosen, 0)
+    inner = core_points(field, other, ends[:, 0], places.spans.take(one, 0), most, merged, known)
     if not len(inner.pairs):
-        return found
+        return Candidates([(field, which)], *at_ends)
     which = other.take(inner.pairs)
     new = (one.take(inner.pairs), which, INSIDE + inner.features, inner.points, inner.distances, inner.normals)
-    columns = [np.concatenate(pair) for pair in zip(found[1:], new, strict=True)] if len(chosen) else new
+    columns = [np.concatenate(pair) for pair in zip(at_ends, new, strict=True)] if len(chosen) else new
     return Candidates([(field, columns[1])], *columns)
 
 
 def _own(
-    cores: Cores, places: CorePlaces, pairs: Any, ends: FloatArray, limits: FloatArray, margin: float, merged: float, count: int
+    cores: Cores, places: CorePlaces, pairs: Any, limits: FloatArray, margin: float, merged: float, count: int
 ) -> Candidates:
     """Candidates between the robot's own capsules, which are obstacles after the `count` of the environment."""
     field = own_capsules(cores, places)
     near = near_pairs(cores, places, pairs, margin)
-    touching = np.zeros((len(ends), cores.count), dtype=bool)
-    touching[cores.end_numbers[near[:, 0]], near[:, 1:]] = True
-    long = near[cores.lengths[near[:, 0]] > 0.0]
-    found = _near(field, cores, places, ends, touching, (long[:, 0], long[:, 1]), limits, merged)
+    found = _near(field, places, near[:, 0], near[:, 1], np.True_, limits, merged)
+    ends = (found.features < INSIDE).nonzero()[0]
+    numbers = cores.end_numbers[found.capsules[ends], found.features[ends]]
+    found.capsules[ends], found.features[ends] = cores.end_capsules[numbers], cores.end_features[numbers]
     different = different_contacts(cores, field, found.capsules, found.features, found.obstacles, found.points)
     capsules, which, *others = (column[different] for column in found[1:])
     return Candidates([(field, which)], capsules, count + which, *others)

@@ -42,8 +42,8 @@ class Cores:
         self.radii = np.array([one.radius for one in self.capsules])
         self.joints = np.array([one.joint for one in self.capsules], dtype=np.intp)
         self.lengths = np.array([float(np.linalg.norm(one.end - one.start)) for one in self.capsules])
-        self.long_ways = np.where(self.lengths > 0.0, self.lengths, -np.inf)
-        """Lengths of the cores; minus infinity of points, which have no inside."""
+        self.ways = 2.0 * self.radii + self.lengths
+        """Sum of the distances of both ends from what touches a capsule, at most, shape (n,) [m]."""
         self._model, self._data = model.workspace(None)
         self._numbers, self.carrier = np.unique(self.joints, return_inverse=True)
         self._numbers = self._numbers.tolist()
@@ -62,6 +62,8 @@ class Cores:
         """Capsule of each of them, and whether it is the start (0) or the end (1) of its core."""
         self.end_numbers = numbers.reshape(-1, 2)
         """Place of start and end of each core among the different ends, shape (n, 2)."""
+        self.counted = self.single_ends.take(self.end_numbers) == np.arange(2 * self.count).reshape(-1, 2)
+        """Whether each end is the first of those that are the same, shape (n, 2)."""
         self.at_base, self.bases = self._at_base(moving[self.single_ends])
         """Different ends at the base, with an end within their radius that no joint moves, and that end, both of shape (k,)."""
         self.base_radii = self.radii[self.end_capsules[self.bases]][:, None]

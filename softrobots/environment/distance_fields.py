@@ -14,11 +14,12 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.vectors import cross
 
 ON_BORDER = 1e-9
 """Distance beyond a face, over that from the body, below which a point belongs to the face; exact at crossed borders."""
 _TINY = 1e-300
-_RADIAL, _AXIS = np.array([1.0, 1.0, 0.0]), np.array([0.0, 0.0, 1.0])
+_RADIAL = np.array([1.0, 1.0, 0.0])
 
 
 class Field(Protocol):
@@ -34,8 +35,13 @@ class Field(Protocol):
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance, shape (m,) [m], and normal, shape (m, 3), at points, shape (m, 3)."""
 
-    def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
-        r"""Directions `a`, shape (m, k, 3), and weights `c`, shape (m, k) [1/m]: :math:`H = \sum_k c_k\, a_k a_k^T`."""
+    def curvature(
+        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        r"""Directions `a`, shape (m, k, 3), and weights `c`, shape (m, k) [1/m]: :math:`H = \sum_k c_k\, a_k a_k^T`.
+
+        Distances and normals are those of `at`.
+        """
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and `t^T H t` of directions `t`, shape (m, 3): shape (m,) [1/m]."""
@@ -66,7 +72,9 @@ class HalfSpaces(NamedTuple):
         normals = self.normals.take(which, 0)
         return (points * normals).sum(axis=1) - self.offsets.take(which), normals
 
-    def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
+    def curvature(
+        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Zero: planes."""
         return np.zeros((len(points), 0, 3)), np.zeros((len(points), 0))
 
@@ -79,17 +87,22 @@ class HalfSpaces(NamedTuple):
         return np.zeros((len(starts), 0))
 
 
+def _of(values: Any, which: Any) -> Any:
+    """Values of the body of each point; of a single body once for all points."""
+    return values if len(values) == 1 else values.take(which, 0)
+
+
 def _turned_into(rotations: FloatArray, which: Any, vectors: FloatArray) -> FloatArray:
     """Vectors, shape (m, 3), in the axes of their bodies; of a single body as one product."""
     if len(rotations) == 1:
-        return np.asarray(vectors.dot(rotations[0]))
+        return vectors.dot(rotations[0])  # type: ignore[no-any-return]
     return np.asarray(np.vecmat(vectors, rotations.take(which, 0)))
 
 
 def _turned_out(rotations: FloatArray, which: Any, vectors: FloatArray) -> FloatArray:
     """Vectors in the axes of their bodies, shape (m, 3), in world axes."""
     if len(rotations) == 1:
-        return np.asarray(vectors.dot(rotations[0].T))
+        return vectors.dot(rotations[0].T)  # type: ignore[no-any-return]
     return np.asarray(np.matvec(rotations.take(which, 0), vectors))
 
 
@@ -128,8 +141,8 @@ class RoundedBoxes:
 
     def _beyond(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Points in the axes of the bodies, how far beyond the faces, the same or zero, and the distance from the box."""
-        local = _turned_into(self.rotations, which, points - self.centres.take(which, 0))
-        beyond = np.abs(local) - self.halves.take(which, 0)
+        local = _turned_into(self.rotations, which, points - _of(self.centres, which))
+        beyond = np.abs(local) - _of(self.halves, which)
         outside = np.maximum(beyond, 0.0)
         return local, beyond, outside, np.sqrt(np.vecdot(outside, outside))
 
@@ -139,86 +152,62 @@ class RoundedBoxes:
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance and normal."""
-        return self._at(which, *self._beyond(points, which))
+        distance, normal = self._at(which, *self._beyond(points, which))
+        return distance, _turned_out(self.rotations, which, normal)
 
     def _at(
         self, which: Any, local: FloatArray, beyond: FloatArray, outside: FloatArray, distance: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Distance and normal from what `_beyond` returns."""
+        """Distance, and normal in the axes of the body, from what `_beyond` returns."""
         within = (distance < _TINY).nonzero()[0]
         normal = outside / (np.maximum(distance, _TINY) if len(within) else distance)[:, None]
-        distance = distance - self.radii.take(which)
+        distance = distance - _of(self.radii, which)
         if len(within):
             deepest = beyond[within].argmax(axis=1)
             normal[within, deepest] = 1.0
             distance[within] += beyond[within, deepest]
-        return distance, _turned_out(self.rotations, which, np.copysign(normal, local))
+        return distance, np.copysign(normal, local)
 
-    def _round(self, which: Any, beyond: FloatArray, distance: FloatArray) -> tuple[Any, FloatArray]:
-        """Coordinates that are beyond faces, shape (m, 3), and one over the distance, zero at faces, shape (m,) [1/m]."""
-        curved = (beyond > ON_BORDER * distance[:, None]) | self._thin.take(which, 0)
-        size = ((np.add.reduce(curved, 1) > 1) & (distance > _TINY)) / np.maximum(distance, _TINY)
+    def _round(self, which: Any, normals: FloatArray, distances: FloatArray) -> tuple[Any, FloatArray]:
+        """Coordinates that are beyond faces, shape (m, 3), and one over the distance, zero at faces, shape (m,) [1/m].
+
+        Of normals in the axes of the bodies, and distances from the boxes without the radius.
+        """
+        curved = (np.abs(normals) > ON_BORDER) | _of(self._thin, which)
+        size = ((np.add.reduce(curved, 1) > 1) & (distances > _TINY)) / np.maximum(distances, _TINY)
         return curved, size
 
-    def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
+    def curvature(
+        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """One over the distance, in the coordinates that are beyond faces and across the normal; zero at faces."""
-        local, beyond, outside, distance = self._beyond(points, which)
-        curved, size = self._round(which, beyond, distance)
+        turned = _turned_into(self.rotations, which, normals)
+        curved, size = self._round(which, turned, distances + _of(self.radii, which))
         if not size.any():  # faces
             return np.zeros((len(points), 0, 3)), np.zeros((len(points), 0))
         size = size[:, None]
-        normal = _turned_out(self.rotations, which, np.copysign(outside * size, local))
-        directions = np.concatenate([self.rotations.take(which, 0).swapaxes(1, 2), normal[:, None]], axis=1)
+        directions = np.concatenate([self.rotations.take(which, 0).swapaxes(1, 2), normals[:, None]], axis=1)
         return directions, np.concatenate([curved * size, -size], axis=1)
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and the second derivative."""
         found = self._beyond(points, which)
         distance, normal = self._at(which, *found)
-        curved, size = self._round(which, found[1], found[3])
         turned = _turned_into(self.rotations, which, directions)
-        slopes = np.vecdot(normal, directions)
-        return distance, normal, size * (np.vecdot(curved * turned, turned) - slopes * slopes)
+        slopes = np.vecdot(normal, turned)
+        curved, size = self._round(which, normal, found[3])
+        bend = size * (np.vecdot(curved * turned, turned) - slopes * slopes)
+        return distance, _turned_out(self.rotations, which, normal), bend
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where the coordinates pass the faces."""
         if not self._faces:
             return np.zeros((len(starts), 0))
-        halves = self.halves.take(which, 0)
-        local = _turned_into(self.rotations, which, starts - self.centres.take(which, 0))
+        halves = _of(self.halves, which)
+        local = _turned_into(self.rotations, which, starts - _of(self.centres, which))
         along = _turned_into(self.rotations, which, spans)
         along = np.where((halves > 0.0) & (np.abs(along) > _TINY), along, np.inf)
         return np.concatenate([(halves - local) / along, (-halves - local) / along], axis=1)
-
-
-class _BesideCylinder(NamedTuple):
-    """Points in the axes of cylinders."""
-
-    from_axis: FloatArray
-    """Distances from the axis, shape (m,) [m]."""
-    beyond: FloatArray
-    """How far they are beyond side and ends, shape (m, 2) [m]."""
-    outside: FloatArray
-    """Distances from the cylinder, zero inside, shape (m,) [m]."""
-    slopes: FloatArray
-    """Derivatives of the distance by the distance from the axis and beyond the ends, shape (m, 2)."""
-    outward: FloatArray
-    """Directions from the axis, shape (m, 3)."""
-    normal: FloatArray
-    """Normals, shape (m, 3)."""
-
-    @property
-    def distance(self) -> FloatArray:
-        """Signed distances, shape (m,) [m]."""
-        return np.asarray(self.outside + np.minimum(self.beyond.max(axis=1), 0.0))
-
-    @property
-    def curvatures(self) -> tuple[FloatArray, FloatArray]:
-        """Around the axis, and across the rim, zero elsewhere; both of shape (m,) [1/m]."""
-        positive = np.maximum(self.outside, _TINY)
-        across = np.where(self.outside > _TINY, self.slopes[:, 0] / np.maximum(self.from_axis, _TINY), 0.0)
-        rim = (self.beyond > ON_BORDER * self.outside[:, None]).all(axis=1) & (self.outside > _TINY)
-        return across, np.where(rim, 1.0 / positive, 0.0)
 
 
 class Cylinders:
@@ -229,22 +218,33 @@ class Cylinders:
         self.rotations, self.centres, self.halves, self.radii = rotations, centres, halves, radii
         self._around = _Around(rotations[:, :, 2], centres, halves, radii)
 
-    def _beyond(self, points: FloatArray, which: Any) -> _BesideCylinder:
-        """Points in the axes of the bodies."""
-        local = _turned_into(self.rotations, which, points - self.centres.take(which, 0))
+    def _at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
+        """Distance, and normal in the axes of the body."""
+        local = _turned_into(self.rotations, which, points - _of(self.centres, which))
         from_axis, beyond = np.hypot(local[:, 0], local[:, 1]), np.zeros((len(points), 2))
-        beyond[:, 0] = from_axis - self.radii.take(which)
-        beyond[:, 1] = np.abs(local[:, 2]) - self.halves.take(which)
+        beyond[:, 0] = from_axis - _of(self.radii, which)
+        beyond[:, 1] = np.abs(local[:, 2]) - _of(self.halves, which)
         slopes = np.maximum(beyond, 0.0)
-        outside = np.sqrt(np.vecdot(slopes, slopes))
-        slopes /= np.maximum(outside, _TINY)[:, None]
-        within = (outside < _TINY).nonzero()[0]
-        slopes[within, beyond[within].argmax(axis=1)] = 1.0
-        outward = (local * _RADIAL) / np.maximum(from_axis, _TINY)[:, None]
-        outward[:, 0] += from_axis < _TINY  # on the axis: any direction across
-        normal = slopes[:, :1] * outward
+        distance = np.sqrt(np.vecdot(slopes, slopes))
+        slopes /= np.maximum(distance, _TINY)[:, None]
+        within = (distance < _TINY).nonzero()[0]
+        if len(within):
+            deepest = beyond[within].argmax(axis=1)
+            slopes[within, deepest] = 1.0
+            distance[within] += beyond[within, deepest]
+        normal = local * (slopes[:, 0] / np.maximum(from_axis, _TINY))[:, None]
+        on_axis = (from_axis < _TINY).nonzero()[0]
+        normal[on_axis, 0] = slopes[on_axis, 0]  # any direction across
         normal[:, 2] = np.copysign(slopes[:, 1], local[:, 2])
-        return _BesideCylinder(from_axis, beyond, outside, slopes, outward, normal)
+        return distance, normal
+
+    def _round(self, which: Any, normals: FloatArray, distances: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Directions from the axis, curvature around it, and across the rim, zero elsewhere, from what `_at` returns."""
+        radial = np.hypot(normals[:, 0], normals[:, 1])
+        outside, from_axis = distances > _TINY, _of(self.radii, which) + distances * radial
+        rim = outside & (radial > ON_BORDER) & (np.abs(normals[:, 2]) > ON_BORDER)
+        outward = (normals * _RADIAL) / np.maximum(radial, _TINY)[:, None]
+        return outward, outside * radial / np.maximum(from_axis, _TINY), rim / np.maximum(distances, _TINY)
 
     def at_least(self, points: FloatArray) -> FloatArray:
         """Distance from a capsule around the body."""
@@ -252,33 +252,34 @@ class Cylinders:
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance and normal."""
-        found = self._beyond(points, which)
-        return found.distance, _turned_out(self.rotations, which, found.normal)
+        distance, normal = self._at(points, which)
+        return distance, _turned_out(self.rotations, which, normal)
 
-    def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
+    def curvature(
+        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Around the axis at side and rim, and across the rim."""
-        found = self._beyond(points, which)
-        outward, (across, size) = found.outward, found.curvatures
-        around = np.stack([-outward[:, 1], outward[:, 0], outward[:, 2]], axis=1)
-        axes = np.broadcast_to(_AXIS, outward.shape)
-        directions = np.stack([around, outward, axes, found.normal], axis=1) @ self.rotations.take(which, 0).swapaxes(1, 2)
+        outward, across, size = self._round(which, _turned_into(self.rotations, which, normals), distances)
+        axes = self.rotations.take(which, 0).swapaxes(1, 2)
+        outward = _turned_out(self.rotations, which, outward)
+        directions = np.stack([cross(axes[:, 2], outward), outward, axes[:, 2], normals], axis=1)
         return directions, np.stack([across, size, size, -size], axis=1)
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and the second derivative."""
-        found = self._beyond(points, which)
-        outward, (across, size) = found.outward, found.curvatures
+        distance, normal = self._at(points, which)
+        outward, across, size = self._round(which, normal, distance)
         turned = _turned_into(self.rotations, which, directions)
         radial, axial = np.vecdot(outward, turned), turned[:, 2]
         around = outward[:, 0] * turned[:, 1] - outward[:, 1] * turned[:, 0]
-        slopes = np.vecdot(found.normal, turned)
+        slopes = np.vecdot(normal, turned)
         bend = across * around * around + size * (radial * radial + axial * axial - slopes * slopes)
-        return found.distance, _turned_out(self.rotations, which, found.normal), bend
+        return distance, _turned_out(self.rotations, which, normal), bend
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where it passes the planes of the ends, and the side."""
-        half, radius = self.halves.take(which), self.radii.take(which)
-        local = _turned_into(self.rotations, which, starts - self.centres.take(which, 0))
+        half, radius = _of(self.halves, which), _of(self.radii, which)
+        local = _turned_into(self.rotations, which, starts - _of(self.centres, which))
         along = _turned_into(self.rotations, which, spans)
         rise = np.where(np.abs(along[:, 2]) > _TINY, along[:, 2], np.inf)
         square = along[:, 0] ** 2 + along[:, 1] ** 2

@@ -59,9 +59,11 @@ class Gaps:
         """Material points of the cores, and normals from obstacle to robot, shape (m, 3)."""
         self.radii: FloatArray = cores.radii.take(found.capsules)
         """Radii of the capsules, shape (m,) [m]."""
+        self.distances: FloatArray = found.distances
+        """Distances of the core points from the obstacles, shape (m,) [m]."""
         self.values: FloatArray = found.distances - self.radii
         """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
-        self._cores, self.places, self.parts, self._transforms, self._reach = cores, places, found.parts, transforms, reach
+        self._cores, self.places, self.parts, self._transforms, self.reach = cores, places, found.parts, transforms, reach
         self._own = own
         self.moves: FloatArray = cores.moves.take(found.capsules, 0)
         """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
@@ -86,7 +88,7 @@ class Gaps:
     @property
     def obstacle_points(self) -> FloatArray:
         """Nearest points on the obstacles, shape (m, 3) [m]."""
-        return np.asarray(self.core_points - (self.values + self.radii)[:, None] * self.normals)
+        return np.asarray(self.core_points - self.distances[:, None] * self.normals)
 
     @cached_property
     def keys(self) -> tuple[tuple[int, int, int], ...]:
@@ -120,8 +122,8 @@ class Gaps:
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
             return self._cores.no_load
-        normals, moves = self.normals.take(rows, 0), self._cores.moves.take(self.capsules.take(rows), 0)
-        points, vectors = self.core_points.take(rows, 0), forces.take(rows, 0)
+        normals, points, vectors = self.normals.take(rows, 0), self.core_points.take(rows, 0), forces.take(rows, 0)
+        moves = self._cores.moves.take(self.capsules.take(rows), 0)
         if normal:
             vectors = vectors[:, None] * normals
         else:
@@ -141,7 +143,7 @@ class Gaps:
             by_moment=None,
             gravity_derivative=None,
             potential=-float(vectors.ravel().dot(points.ravel())),
-            scale=self._reach * sum(map(math.hypot, *vectors.T.tolist())),
+            scale=self.reach * sum(map(math.hypot, *vectors.T.tolist())),
         )
 
     def curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -169,14 +171,12 @@ class Gaps:
 
     def _curved(self, field: Field, which: Any, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
         """Append the terms of the candidates of one field."""
-        points = self.core_points.take(rows, 0)
-        directions, curvatures = field.curvature(points, which)
-        bent, place = curvatures.nonzero()
-        if not len(bent):
+        directions, curvatures = self.bends(field, which, rows)
+        if not curvatures.shape[1]:
             return
-        velocity = self.point_jacobian(rows, points)
-        found.append((directions @ velocity)[bent, place])
-        weights.append((forces[:, None] * curvatures)[bent, place])
+        velocity = self.point_jacobian(rows, self.core_points.take(rows, 0))
+        found.append((directions @ velocity).reshape(-1, velocity.shape[2]))
+        weights.append((forces[:, None] * curvatures).ravel())
         inside = (self.features.take(rows) == INSIDE).nonzero()[0]
         if not len(inside):
             return
@@ -190,11 +190,15 @@ class Gaps:
             found.append((np.vecmat(pulls, velocity.take(inside, 0)) + turned).take(slides, 0))
             weights.append((-forces.take(inside) / np.where(bend > 0.0, bend, 1.0)).take(slides))
 
+    def bends(self, field: Field, which: Any, rows: Any) -> tuple[FloatArray, FloatArray]:
+        """Directions and curvatures, as `Field.curvature`, of candidates of one field, shape (k,), on its bodies `which`."""
+        return field.curvature(self.core_points.take(rows, 0), which, self.distances.take(rows), self.normals.take(rows, 0))
+
     def _curved_by_itself(self, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
         """Append the terms of candidates of the robot with itself."""
         for row in rows.tolist():
             pair = int(self.capsules[row]), int(self.obstacles[row]) - len(self._transforms)
-            distance = float(self.values[row] + self.radii[row] + self._cores.radii[pair[1]])
+            distance = float(self.distances[row] + self._cores.radii[pair[1]])
             slides = bool(self.features[row] == INSIDE)
             point, normal = self.core_points[row], self.normals[row]
             new, each = relative_curvature(self._cores, self.places, pair, point, normal, distance, slides)

@@ -19,7 +19,7 @@ _ROUND = 0.1
 """The same, above which a minimum stands for a border of its feature that is nearer than half the distance."""
 
 
-_NARROW = 1e-15
+_NARROW, _TINY = 1e-15, 1e-300
 _BOTH, _ENDS = np.array([0, 1]), np.array([[0.0, 1.0]])
 
 
@@ -71,14 +71,19 @@ def core_points(
     if at_ends is None:
         both = field.at(np.stack([starts, starts + spans], axis=1).reshape(-1, 3), which.repeat(2))
         at_ends = both[0].reshape(-1, 2), both[1].reshape(-1, 2, 3)
-    length = np.sqrt(np.vecdot(spans, spans))
+    length = np.maximum(np.sqrt(np.vecdot(spans, spans)), _TINY)
     along = spans / length[:, None]
     distances, slopes, shares = at_ends[0], np.matvec(at_ends[1], along), _ENDS
-    borders = field.borders(starts, spans, which)
+    borders, between = field.borders(starts, spans, which), (slopes[:, 0] < 0.0) & (slopes[:, 1] > 0.0)
     crossed = (borders > 0.0) & (borders < 1.0)
-    used = np.asarray(crossed.any(axis=0)).nonzero()[0]
+    if crossed.any():  # the tangents at both ends are below the distance
+        borders = np.where(crossed, borders, 1.0)
+        ways = borders * length[:, None]
+        least = np.maximum(ways * slopes[:, :1] + distances[:, :1], (ways - length[:, None]) * slopes[:, 1:] + distances[:, 1:])
+        crossed &= (least <= limits[:, None]) | between[:, None]
+    rows, used = between.nonzero()[0], np.logical_or.reduce(crossed, 0).nonzero()[0]
     if len(used):
-        borders = np.where(crossed, borders, 1.0).take(used, 1)
+        borders = borders.take(used, 1)
         order = borders.argsort(axis=1)
         borders = np.sort(borders, axis=1)
         points = starts[:, None] + borders[:, :, None] * spans[:, None]
@@ -90,7 +95,6 @@ def core_points(
         shares = _between(np.broadcast_to(_ENDS, (len(which), 2)), borders)
 
     found = NO_POINTS
-    rows = ((slopes[:, 0] < 0.0) & (slopes[:, -1] > 0.0)).nonzero()[0]
     if len(rows):
         bodies, begins, ways, lengths = which.take(rows), starts.take(rows, 0), spans.take(rows, 0), length.take(rows)
         place = (slopes.take(rows, 0) < 0.0).sum(axis=1) - 1

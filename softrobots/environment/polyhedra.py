@@ -44,7 +44,9 @@ class Polyhedra:
         found = [self._nearest(point, body) for point, body in zip(points, which.tolist(), strict=True)]
         return np.array([one.distance for one in found]), np.array([one.normal for one in found]).reshape(-1, 3)
 
-    def curvature(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
+    def curvature(
+        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
         """Zero at faces, across the edge at an edge, the same in both directions across the normal at a corner."""
         directions, curvatures = np.zeros((len(points), 2, 3)), np.zeros((len(points), 2))
         for row, (point, body) in enumerate(zip(points, which.tolist(), strict=True)):
@@ -58,9 +60,10 @@ class Polyhedra:
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and the second derivative."""
-        axes, curvatures = self.curvature(points, which)
+        found = self.at(points, which)
+        axes, curvatures = self.curvature(points, which, *found)
         turned = (axes @ directions[:, :, None])[:, :, 0]
-        return *self.at(points, which), (curvatures * turned * turned).sum(axis=1)
+        return *found, (curvatures * turned * turned).sum(axis=1)
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where the nearest point passes from a face to an edge (two columns an edge), or from an edge to a corner (two)."""

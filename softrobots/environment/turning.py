@@ -31,7 +31,7 @@ def turning(gaps: Gaps) -> tuple[FloatArray, FloatArray]:
         first += len(which)
         if isinstance(field, HalfSpaces) or not len(rows):
             continue
-        directions, curvatures = field.curvature(gaps.core_points[rows], which)
+        directions, curvatures = gaps.bends(field, which, rows)
         hessian = np.swapaxes(directions, 1, 2) @ (curvatures[:, :, None] * directions)
         spans = gaps.places.spans[gaps.capsules[rows]]
         pulls = (hessian @ spans[:, :, None])[:, :, 0]

@@ -1,4 +1,4 @@
-"""Jobs of contact: an arm that leans on a wall, and a rod that lies on ten pegs, against MuJoCo's settling there."""
+"""Jobs of contact: an arm that leans on a wall, a ball or a box, and a rod on ten pegs; MuJoCo settles on wall and pegs."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NotConverged, SoftRobotsError
 from softrobots.environment.environment import Environment
-from softrobots.environment.obstacles import Cylinder, HalfSpace
+from softrobots.environment.obstacles import Box, Cylinder, HalfSpace, Obstacle, Sphere
 from softrobots.export import to_mjcf
 from softrobots.export.mjcf_contact import steadying_armature
 from softrobots.model.soft_model import SoftModel
@@ -37,6 +37,7 @@ LOOSELY = "MuJoCo settling, file as exported, forces within 0.001"
 _LOOSE = tuple(10.0**-power for power in range(1, 11))  # out of balance over force times reach, to stop at
 _MOTORS = (0.3, 0.6, -0.8)  # of the arm [rad]
 _PUSH, _TOUCH = 18.03, 0.02  # force on the tip of the arm [N], and distance of the wall from it, unloaded [m]
+_BALL = 0.3  # radius of the ball, and half an edge of the box, that the arm leans on [m]
 _ASIDE = 9.81  # weight of the rod, across it [m/s^2]
 _SHARE = 0.6  # of the deflection of the rod under its weight, at which the pegs stand
 _TIP_FORCE = 0.05  # on the tip of the rod [N]
@@ -117,16 +118,22 @@ def stacked(forces: Mapping[str, FloatArray], names: Sequence[str]) -> FloatArra
 
 
 @lru_cache(maxsize=1)
-def leaning_arm(count: int) -> Scene:
-    """The arm, weightless, pushed by forces in random directions on a wall that it touches in one place."""
-    tip = solve_equilibrium(arm(), _MOTORS).tip_position
-    wall = Environment([HalfSpace((0.0, -1.0, 0.0), -float(tip[1]) - 0.055 - _TOUCH)])
+def leaning_arm(count: int, on: str = "wall") -> Scene:
+    """The arm, weightless, pushed by forces in random directions on a wall, a ball or a box, that it touches in one place."""
+    x, y, z = solve_equilibrium(arm(), _MOTORS).tip_position.tolist()
+    surface = y + 0.055 + _TOUCH
+    behind = (x, surface + _BALL, z)
+    obstacles: dict[str, Obstacle] = {
+        "wall": HalfSpace((0.0, -1.0, 0.0), -surface),
+        "ball": Sphere(_BALL, behind),
+        "box": Box((2.0 * _BALL,) * 3, behind),
+    }
     forces = random_forces(4 * count, _PUSH)
     aside = forces[forces[:, 1] > 0.6 * _PUSH][:count]
     motors = np.tile(_MOTORS, (len(aside), 1))
-    name = "arm on a wall, one contact"
+    name, around = f"arm on a {on}, one contact", Environment([obstacles[on]])
     still = (0.0, 0.0, 0.0)
-    return Scene(name, arm(), arm(), wall, still, LoadCases(motors, aside), DAMPINGS, 5e-4, "the same arm")
+    return Scene(name, arm(), arm(), around, still, LoadCases(motors, aside), DAMPINGS, 5e-4, "the same arm")
 
 
 @lru_cache(maxsize=1)
@@ -156,14 +163,24 @@ def contact(settings: Settings) -> Outcome:
         for name in (AS_EXPORTED, LOOSELY, MUJOCO, MUJOCO_ANY):
             comparison.add(name, partial(_settling, name, settings, scene, notes))
         comparison.run()
-        for name in (GENERAL, _SINGLE):
-            values = comparison.seconds[name] if name in comparison.seconds else comparison.absent[name]
-            rows.append(dataclasses.replace(figure(scene.name, name, "s", values, AT_MOST, scene.target), clock="CPU"))
+        rows += [_time(comparison, scene, name) for name in (GENERAL, _SINGLE)]
         rows.append(comparison.cheaper(scene.name, GENERAL, AS_EXPORTED, AT_LEAST, 20.0))
         rows += [comparison.cheaper(scene.name, GENERAL, name) for name in (LOOSELY, MUJOCO, MUJOCO_ANY)]
         rows.append(comparison.cheaper(scene.name, _SINGLE, AS_EXPORTED, AT_LEAST, 20.0))
         rows += [comparison.cheaper(scene.name, _BATCH, name, AT_LEAST, 20.0) for name in (AS_EXPORTED, LOOSELY)]
+    for on in ("ball", "box"):
+        scene = leaning_arm(settings.singles, on)
+        comparison = Comparison(settings, scene.name)
+        comparison.add(GENERAL, partial(_ours, scene))
+        comparison.run()
+        rows.append(_time(comparison, scene, GENERAL))
     return Outcome(rows, notes=notes)
+
+
+def _time(comparison: Comparison, scene: Scene, name: str) -> Row:
+    """What an equilibrium of a scene takes."""
+    values = comparison.seconds[name] if name in comparison.seconds else comparison.absent[name]
+    return dataclasses.replace(figure(scene.name, name, "s", values, AT_MOST, scene.target), clock="CPU")
 
 
 def _ours(scene: Scene) -> Workload:

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -23,6 +24,9 @@ STICKS = "sticks"
 
 SLIPS = "slips"
 """The force is on the cone of friction, against the slip."""
+
+
+_ONE_PLACE = 5e-5  # over the reach: a ball of that radius leaves a plane by 1.25e-9 there, more than surfaces that touch
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,10 +74,24 @@ class Contact:
 def contacts_of(touch: Touch, active: ActiveContacts) -> tuple[Contact, ...]:
     """Return the touching candidates of a state as contacts without friction."""
     pressed, nothing = set(active.pressed.tolist()), np.zeros(3)
-    return tuple(
+    found = [
         contact_at(touch.surroundings, touch.gaps, place, force, nothing, PRESSED if place in pressed else TOUCHING, nothing)
         for place, force in zip(active.touching.tolist(), touch.forces[active.touching].tolist(), strict=True)
-    )
+    ]
+    return each_once(found, touch.gaps.reach) if len(active.weak) else tuple(found)
+
+
+def each_once(contacts: Sequence[Contact], reach: float) -> tuple[Contact, ...]:
+    """Leave out what only touches where another contact of the same obstacle is: beside it gaps are zero within the tolerance.
+
+    Where two capsules of the robot meet, those are the ends of both beside the nearest point of one.
+    """
+    kept = [one for one in contacts if one.strict]
+    for one in contacts:
+        same = (other for other in kept if one.obstacle == other.obstacle or (one.with_itself and other.with_itself))
+        if not one.strict and all(math.dist(one.point, other.point) > _ONE_PLACE * reach for other in same):
+            kept.append(one)
+    return tuple(one for one in contacts if one in kept)
 
 
 def contact_at(

@@ -38,7 +38,7 @@ class ContactWalk:
 
     def __init__(self, way: Way) -> None:
         """Take the way."""
-        self._way, self._share, self._waits = way, 0.25, False
+        self._way, self._share, self._least, self._waits = way, 0.25, SMALLEST, False
         self.events: list[ContactEvent] = []
         self.work = 0.0
         """Work against friction so far [J]."""
@@ -61,22 +61,29 @@ class ContactWalk:
             if aim >= changed:  # statuses are known to be others there
                 aim = 0.5 * (place + changed) if changed - place > EVENT else changed
             there = self._way.step(aim, here, aim - place <= PATIENT)
-            if there is None and aim - place <= SMALLEST:
+            if there is None and aim - place <= self._least:
                 there = self._way.blocked(aim, here)
                 if there is None:
                     return None
+                self._least = min(2.0 * self._least, PATIENT)  # where one place after the other is blocked
+                self._share = self._least
             elif there is None:
-                self._share, self._waits = max(0.5 * (aim - place), SMALLEST), True
+                self._share, self._waits = max(0.5 * (aim - place), self._least), True
                 continue
-            elif aim - place > EVENT and there.statuses != here.statuses:
+            else:
+                self._least = SMALLEST
+            if aim - place > max(EVENT, self._least) and there.statuses != here.statuses:
                 changed = aim
                 continue
             self._tell(here.statuses, there.statuses, self._way.parameter(aim))
             self.work += there.work
             if there.statuses != here.statuses:
                 self._share, changed, self._waits = 2.0 * (aim - place), math.inf, False
-            elif changed == math.inf and not self._waits:
-                self._share = min(2.0 * self._share, 1.0)
+            else:
+                if aim >= changed:  # in a smaller step from here they stay
+                    changed = math.inf
+                if not self._waits:
+                    self._share = min(2.0 * self._share, 1.0)
             here, place, self._waits = there, aim, False
         return here
 

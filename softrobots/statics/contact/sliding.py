@@ -21,7 +21,7 @@ from softrobots.model.coordinates import Point
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import null_space
-from softrobots.statics.contact.contact import PRESSED, SLIPS, STICKS, TOUCHING, Contact, contact_at
+from softrobots.statics.contact.contact import PRESSED, SLIPS, STICKS, TOUCHING, Contact, contact_at, each_once
 from softrobots.statics.contact.contact_laws import Balance, NearContacts
 from softrobots.statics.contact.last_state import MARGIN, Given, Sliding, forces_by_key, world
 from softrobots.statics.contact.newton_in_contact import ByMotors
@@ -242,7 +242,7 @@ class SlidingRobot:
             one = contact_at(self.given.surroundings, gaps, row, force, along[row], status, slid[row])
             share = float(np.linalg.norm(along[row])) / (mu * force) if status in (STICKS, SLIPS) else 0.0
             contacts.append(replace(one, cone_share=share))
-        return tuple(contacts)
+        return each_once(contacts, self.reach)
 
     def equilibrium(self, found: Balance, iterations: int) -> Equilibrium:
         """Return the state found, at the coordinates asked last, as a result."""

@@ -182,7 +182,7 @@ def unmoved(touch: Touch, point: Point) -> Any:
 
 def deepest_penetration(touch: Touch, point: Point) -> str:
     """Return what penetrates most, in words; rather what no spring moves."""
-    depths = np.maximum(-touch.gaps.values, 0.0)
+    depths = np.where(touch.gaps.values < -TOUCHING * touch.gaps.reach, -touch.gaps.values, 0.0)
     fixed = depths * unmoved(touch, point)
     place = int((fixed if fixed.any() else depths).argmax())
     link, other, _ = touch.surroundings.pair(touch.gaps, place)
