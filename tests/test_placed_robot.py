@@ -12,6 +12,7 @@ import softrobots as sr
 from softrobots.cli.identify import placement_of
 from softrobots.robots.parameter_file import read_robot, write_parameters
 from softrobots.robots.placed_robot import Marker, RobotPlacement, read_placed_robot
+from softrobots.statics.kinematics import frame_placement
 
 PLACEMENT = RobotPlacement((0.1, -0.2, 0.3), (0.3, 0.2, 0.5), (Marker("ball", "tip", (0.015, 0.01, 0.04)),))
 ROBOTS = {"inflatable_arm": sr.InflatableArm(stiffness=180.0), "pcc_arm": sr.PccArm(segment_lengths=(0.3,), elastic_sections=2)}
@@ -39,23 +40,26 @@ def test_a_file_moves_the_robot_and_not_what_is_told_of_it(name: str, tmp_path: 
     assert jacobian == pytest.approx(np.cross(turning, arm, axisa=0).T, abs=1e-12)
 
 
-def test_a_fit_tells_where_the_robot_stands() -> None:
-    """Base and marker of a fit to rows of the placed robot, without noise."""
+@pytest.mark.parametrize(("marker", "link"), [("ball", "ball"), ("tip", "tip_marker"), ("the ball", "the_ball")])
+def test_a_fit_tells_where_the_robot_stands(marker: str, link: str) -> None:
+    """Base and marker of a fit to rows of the placed robot, without noise; a robot whatever the marker is called."""
     plain = ROBOTS["inflatable_arm"]
     placed = sr.load_model(PLACEMENT.place(plain))
     random = np.random.default_rng(2)
     motors = random.uniform(-0.8, 0.8, (12, 3))
-    poses = [sr.solve_equilibrium(placed, q, gravity=sr.EARTH_GRAVITY).transform_tip_to_world for q in motors]
+    solved = [sr.solve_equilibrium(placed, q, gravity=sr.EARTH_GRAVITY) for q in motors]
+    poses = [one.transform_tip_to_world for one in solved]
     rows = sr.Measurements(
         motors,
         gravity=sr.EARTH_GRAVITY,
-        poses={"tip": np.array([pose.homogeneous for pose in poses])},
-        positions={"ball": np.array([pose.translation + pose.rotation @ PLACEMENT.markers[0].offset for pose in poses])},
-        markers={"ball": "tip"},
+        poses={"link_2": np.array([frame_placement(placed, one.q, "link_2").homogeneous for one in solved])},
+        positions={marker: np.array([pose.translation + pose.rotation @ PLACEMENT.markers[0].offset for pose in poses])},
+        markers={marker: "tip"},
     )
-    found = sr.identify(plain, rows, ("base.position", "base.rotation", "marker.ball.offset"))
+    found = sr.identify(plain, rows, ("base.position", "base.rotation", f"marker.{marker}.offset"))
     read = placement_of(found)
-    assert [one.name for one in read.markers] == ["ball"]
+    assert [one.name for one in read.markers] == [link]
+    assert sr.load_model(read.place(plain)).tip == "tip"
     for one, other in ((read.position, PLACEMENT.position), (read.rotation, PLACEMENT.rotation)):
         assert one == pytest.approx(other, abs=1e-8)
     assert read.markers[0].offset == pytest.approx(PLACEMENT.markers[0].offset, abs=1e-8)

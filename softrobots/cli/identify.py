@@ -193,12 +193,20 @@ def _write(
 
 
 def placement_of(found: Identification) -> RobotPlacement:
-    """Return base and markers that a fit has found; markers on what is no link are left out."""
+    """Return base and markers that a fit has found; markers on what is no link are left out.
+
+    In a description a marker is a link: one that is called as another link, or with signs that links have not, is renamed.
+    """
     parameters, marked = ParameterSet(found.model, found.parameters, found.fitted.measurements.markers), []
+    taken = {frame.name for frame in found.model.pinocchio.frames}
     for name in dict.fromkeys(one.place.names[0] for _, one in parameters.places("marker")):
         frame = frame_of(found.model, name, found.fitted.measurements.markers)
         if found.model.pinocchio.existBodyName(frame):
-            marked.append(Marker(name, frame, tuple(parameters.marker_offset(found.solution, name).tolist())))
+            link = re.sub(r"\W", "_", name)
+            while link in taken:
+                link += "_marker"
+            taken.add(link)
+            marked.append(Marker(link, frame, tuple(parameters.marker_offset(found.solution, name).tolist())))
     position, rotation = (tuple(one.tolist()) for one in parameters.base(found.solution))
     return RobotPlacement(position, rotation, tuple(marked))
 

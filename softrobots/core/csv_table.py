@@ -115,7 +115,9 @@ def _columns(where: str, names: Sequence[str], required: Sequence[str], optional
         named = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
         allowed = [f"{', '.join(required)} are required, each once"] if required else []
         allowed += [f"{', '.join(optional)} at most once"] if optional else []
-        raise FileFormatError(f"{where}: it names {named[:500] or 'nothing'}; {', and '.join(allowed)}")
+        missing = ", ".join(name for name in required if name not in names)
+        what = f"{named[:500] or 'nothing'}{f', and not {missing}' if missing else ''}"
+        raise FileFormatError(f"{where}: it names {what}; {', and '.join(allowed)}")
     return (*(name for name in optional if name in names), *required)
 
 

@@ -53,7 +53,8 @@ class ModelChange(NamedTuple):
         if name not in self.by_number:
             return 0.0
         change = self.by_number[name]
-        return np.asarray(rows.reshape(*rows.shape[:2], len(change)) @ change)
+        count, number = rows.shape[:2]
+        return np.asarray(rows.reshape(count * number, len(change)) @ change).reshape(count, number, self.n_parameters)
 
 
 def model_change(parameters: ParameterSet, values: Any = None, *, fourth_order: bool = False) -> ModelChange:

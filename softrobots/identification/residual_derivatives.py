@@ -35,6 +35,9 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.sensitivity import inverse_stiffness
 
+_OF_SECTIONS, _OF_SPRINGS = {"section_lengths", "section_joints"}, {"stiffness", "rest", "moments"}  # of `model_numbers`
+_OF_ACTUATORS = {"path_length", "path_arms", "path_across", "path_turned", "path_rest", "straightened", "laws"}
+
 
 class EquilibriumDerivatives:
     """N equilibria of a robot without dry friction, and what the derivatives of all outputs need of them."""
@@ -59,15 +62,6 @@ class EquilibriumDerivatives:
             self.strains = np.array([point.strains for point in points])
             by_lengths, by_free = zip(*(point.strain_slopes for point in points), strict=True)
             self.slopes = np.array(by_lengths), np.array(by_free)
-        joints = np.zeros((len(self.strains), model.pinocchio.nv))
-        joints[:, structure.motor_indices] = states.q_motors[:, : self.n_joint_motors]
-        joints[:, structure.spring_indices] = self.strains[:, : self._n_singles]
-        if self._sections is not None:
-            z = self.strains[:, self._n_singles :].reshape(len(joints), -1, 4)
-            self._chain = SectionChain(z, self.numbers["section_lengths"])
-            joints[:, self._sections] = self._chain.positions - self.numbers["section_joints"]
-        self.tree = LoadedTree(model, self.numbers, joints, states.loads)
-        """The joints under the loads."""
         self.springs = SpringStates(model, self.numbers, self.strains)
         """The springs."""
         self.actuators: ActuatorStates | None = None
@@ -75,6 +69,22 @@ class EquilibriumDerivatives:
         if model.muscles:
             tensions = states.actuator_loads[:, self.n_joint_motors :]
             self.actuators = ActuatorStates(model, self.numbers, self.strains, self.inputs, tensions)
+
+    @cached_property
+    def tree(self) -> LoadedTree:
+        """The joints under the loads."""
+        structure = self.model.structure
+        joints = np.zeros((len(self.strains), self.model.pinocchio.nv))
+        joints[:, structure.motor_indices] = self.states.q_motors[:, : self.n_joint_motors]
+        joints[:, structure.spring_indices] = self.strains[:, : self._n_singles]
+        if self._sections is not None:
+            joints[:, self._sections] = self._chain.positions - self.numbers["section_joints"]
+        return LoadedTree(self.model, self.numbers, joints, self.states.loads)
+
+    @cached_property
+    def _chain(self) -> SectionChain:
+        z = self.strains[:, self._n_singles :].reshape(len(self.strains), -1, 4)
+        return SectionChain(z, self.numbers["section_lengths"])
 
     @cached_property
     def compliance(self) -> FloatArray:
@@ -91,11 +101,6 @@ class EquilibriumDerivatives:
                 return inverse
         return np.array([inverse_stiffness(self.model, one) for one in tangent])
 
-    @property
-    def is_plain(self) -> bool:
-        """Whether the robot has neither sections of constant strain nor actuators along the body."""
-        return self._sections is None and self.actuators is None
-
     def joint_rates(self, motors: FloatArray, strains: FloatArray) -> FloatArray:
         """Rates of the joints, shape (N, L, n_joints), at those of motor joints and of the strains, shape (N, L, ...)."""
         structure = self.model.structure
@@ -106,26 +111,32 @@ class EquilibriumDerivatives:
             rates[..., self._sections] = (self._chain.first[:, None] @ self._by_section(strains)[..., None])[..., 0]
         return rates
 
-    def by_coordinates(self, by_twist: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Derivatives of rows that twists change by motor joints, strains, and what the map of the sections depends on.
+    def by_coordinates(self, by_twist: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of rows that twists change by motor joints and strains, shapes (N, L, n_joint_motors), (N, L, n_strains).
 
         Args:
             by_twist: Derivatives by the twist of what is from each joint on, shape (N, n_joints, L, 6).
             rates: The rates of the strains in which loads work, shape (N, L, n_strains): the map turns with the strains.
-
-        Returns:
-            Shapes (N, L, n_joint_motors) and (N, L, n_strains), and arrays by the names of `model_numbers`.
         """
         structure, at_joints = self.model.structure, self.tree.at_joints(by_twist)
         motors, strains = at_joints[..., structure.motor_indices], at_joints[..., structure.spring_indices]
         if self._sections is None:
-            return motors, strains, {}
-        at_sections = at_joints[..., self._sections]
+            return motors, strains
         bending = self._chain.curvature(self.tree.torque[:, self._sections])
-        by_section = (at_sections[..., None, :] @ self._chain.first[:, None])[..., 0, :]
+        by_section = (at_joints[..., self._sections][..., None, :] @ self._chain.first[:, None])[..., 0, :]
         by_section += (bending[:, None] @ self._by_section(rates)[..., None])[..., 0]
-        strains = np.concatenate([strains, by_section.reshape(*strains.shape[:2], 4 * len(self._sections))], axis=-1)
-        return motors, strains, {"section_lengths": by_section[..., 3], "section_joints": -at_sections}
+        return motors, np.concatenate([strains, by_section.reshape(*strains.shape[:2], 4 * len(self._sections))], axis=-1)
+
+    def by_sections(self, by_twist: FloatArray, rates: FloatArray) -> dict[str, FloatArray]:
+        """The same by what the map of the sections depends on, by the names of `model_numbers`.
+
+        Of the joints of a section only the chord `c` depends on its length `l`, in proportion.
+        """
+        at_sections = self.tree.at_joints(by_twist)[..., self._sections]
+        chord, torque = self._chain.first[:, None, :, 2], self.tree.torque[:, None, self._sections[:, 2]]
+        lengths = self.numbers["section_lengths"] + self.strains[:, None, self._n_singles + 3 :: 4]
+        turned = (chord[..., :3] * self._by_section(rates)[..., :3]).sum(-1) / lengths
+        return {"section_lengths": at_sections[..., 2] * chord[..., 3] + torque * turned, "section_joints": -at_sections}
 
     def _by_section(self, strains: FloatArray) -> FloatArray:
         return strains[..., self._n_singles :].reshape(*strains.shape[:2], len(self._sections), 4)
@@ -151,10 +162,6 @@ class AdjointRows:
         given = next(one for one in (outputs.pose, outputs.loads, outputs.strains, outputs.forces) if one is not None)
         shape = given.shape[:2]
         self._weights = np.zeros((*shape, at.model.n_motors)) if outputs.loads is None else outputs.loads
-        if outputs.pose is None:
-            self._by_pose, self._of_frame = np.zeros((shape[0], at.model.pinocchio.nv, shape[1], 6)), np.zeros((*shape, 6))
-        else:
-            self._by_pose, self._of_frame = at.tree.pose_slopes(outputs.frame, outputs.pose)
         self._lengths = np.zeros((*shape, at.model.n_motors - count))  # weights of the lengths of actuators at the same strains
         self.by_actuators, strains = self._solved() if solved is None else solved
         """Derivatives of the outputs by the actuators, shape (N, L, n_motors)."""
@@ -168,7 +175,7 @@ class AdjointRows:
         if at.slopes is not None:
             strains = self._weights[..., count:] @ np.swapaxes(at.slopes[0], -1, -2)
         self._move(strains, works=outputs.loads is not None)
-        motors, elastic, _ = self._by_coordinates()
+        motors, elastic = self._by_coordinates()
         by_actuators = np.zeros(self._weights.shape)
         by_actuators[..., :count] = motors
         if outputs.strains is not None:
@@ -193,56 +200,79 @@ class AdjointRows:
 
     def _move(self, strains: FloatArray, *, works: bool = True) -> None:
         """Take virtual rates of strains, (N, L, n_strains), in which loads work; without `works` they are zero."""
-        at, self.virtual, self._works, self._by_twist = self._at, strains, works, self._by_pose
-        if works:
-            rates = at.joint_rates(self._weights[..., : at.n_joint_motors], strains)
-            self._twists, each = at.tree.twists(rates)
-            self._by_twist = self._by_pose + at.tree.work_slopes(self._twists, each)
+        self.virtual, self._works = strains, works
+        vars(self).pop("_motion", None)
 
-    def _by_coordinates(self) -> tuple[FloatArray, FloatArray, dict[str, FloatArray]]:
-        """Derivatives of pose and work, by motor joints, strains, and numbers of sections and actuators, at fixed rates."""
+    @cached_property
+    def _pose(self) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of the weighted pose by twists of what is from each joint on, and of the frame; see `pose_slopes`."""
+        at, outputs, shape = self._at, self._outputs, self.virtual.shape[:2]
+        if outputs.pose is None:
+            return np.zeros((shape[0], at.model.pinocchio.nv, shape[1], 6)), np.zeros((*shape, 6))
+        return at.tree.pose_slopes(outputs.frame, outputs.pose)
+
+    @cached_property
+    def _motion(self) -> tuple[FloatArray, FloatArray]:
+        """Virtual twists of the bodies, and derivatives of pose and work by the twist of what is from each joint on."""
         at = self._at
-        motors, by_strains, others = at.by_coordinates(self._by_twist, self.virtual)
+        if not self._works:
+            return np.zeros(0), self._pose[0]
+        twists, each = at.tree.twists(at.joint_rates(self._weights[..., : at.n_joint_motors], self.virtual))
+        return twists, self._pose[0] + at.tree.work_slopes(twists, each)
+
+    def _by_coordinates(self) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of pose and work by motor joints and strains, at fixed rates."""
+        at = self._at
+        motors, by_strains = at.by_coordinates(self._motion[1], self.virtual)
         if self._works:
             by_strains = by_strains - at.springs.tangent(self.virtual)
         if self._works and at.actuators is not None:
-            tensions = self._weights[..., at.n_joint_motors :]
-            of_actuators, by_numbers = at.actuators.slopes(self._lengths, tensions, self.virtual)
-            by_strains, others = by_strains + of_actuators, others | by_numbers
-        return motors, by_strains, others
+            by_strains = by_strains + self._of_actuators(at.actuators)[0]
+        return motors, by_strains
+
+    def _of_actuators(self, actuators: ActuatorStates) -> tuple[FloatArray, dict[str, FloatArray]]:
+        """Derivatives of what actuators do, by strains, and by their numbers."""
+        return actuators.slopes(self._lengths, self._weights[..., self._at.n_joint_motors :], self.virtual)
 
     def by_numbers(self, change: ModelChange) -> FloatArray:
         """Derivatives of the outputs by the parameters of a change of the model, shape (N, L, P)."""
         at, total = self._at, np.zeros((*self.virtual.shape[:2], change.n_parameters))
-        found = {} if at.is_plain else self._by_coordinates()[2]
-        if "placements" in change.by_number:
-            found["placements"] = np.swapaxes(at.tree.at_placements(self._by_twist), 1, 2)
-        if "masses" in change.by_number and (by_masses := at.tree.by_masses(self._twists)) is not None:
-            found["masses"] = np.swapaxes(by_masses, 1, 2)
-        if not change.by_number.keys().isdisjoint(("stiffness", "rest", "moments")):
-            found |= at.springs.slopes(self.virtual)
-        if at.is_held and at.actuators is not None:
+        found, changed = dict[str, FloatArray](), change.by_number.keys()
+        if changed & _OF_SECTIONS:
+            found = at.by_sections(self._motion[1], self.virtual)
+        if at.actuators is not None and changed & _OF_ACTUATORS:
+            found |= self._of_actuators(at.actuators)[1]
+        if at.is_held and at.actuators is not None and "held_slopes" in changed:
             found |= self._of_held_directions(at.actuators)
+        if "masses" in changed and (by_masses := at.tree.by_masses(self._motion[0])) is not None:
+            found["masses"] = np.swapaxes(by_masses, 1, 2)
+        if changed & _OF_SPRINGS:
+            found |= at.springs.slopes(self.virtual)
         for name, rows in found.items():
             total += change.along(name, rows)
-        if "frames" in change.by_number:
+        if "placements" in changed:
+            placements = change.by_number["placements"].reshape(-1, 6, change.n_parameters)
+            moved = np.any(placements, axis=(1, 2))
+            by_placement = at.tree.at_placements(self._motion[1], moved)
+            total += (by_placement @ placements[moved]).sum(axis=1)
+        if "frames" in changed:
             frames = change.by_number["frames"].reshape(-1, 6, change.n_parameters)
-            for name, rows in at.tree.by_frames(self._twists).items():
+            for name, rows in at.tree.by_frames(self._motion[0]).items():
                 total += rows @ frames[at.model.frame_id(name)]
             if self._outputs.pose is not None:
-                total += self._of_frame @ frames[at.model.frame_id(self._outputs.frame)]
+                total += self._pose[1] @ frames[at.model.frame_id(self._outputs.frame)]
         return total
 
     def by_loads(self) -> dict[str, FloatArray]:
         """Derivatives of the outputs by the wrench at each frame, shape (N, L, 6), and by gravity, "", shape (N, L, 3)."""
-        return self._at.tree.by_loads(self._twists)
+        return self._at.tree.by_loads(self._motion[0])
 
     def by_base(self) -> FloatArray:
         """Derivatives of the outputs by a motion of the base (position, then rotation) while loads stay, shape (N, L, 6)."""
         tree, total = self._at.tree, np.zeros((*self.virtual.shape[:2], 6))
-        total += self._by_twist[:, tree.topology.parents < 0].sum(axis=1)
+        total += self._motion[1][:, tree.topology.parents < 0].sum(axis=1)
         if self._outputs.pose is not None and tree.frame(self._outputs.frame)[0] < 0:
-            total += self._of_frame
+            total += self._pose[1]
         return total
 
     def _of_held_directions(self, actuators: ActuatorStates) -> dict[str, FloatArray]:

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
@@ -148,8 +148,9 @@ class GeneralResponses(RowSolver):
         for rows in self._parts(len(weights[0]), 1) if self._change.by_number else ():
             known = pulled.motors[rows, None], pulled.strains[rows, None]
             at = EquilibriumDerivatives(self._model, chain.states(solved, pulled, rows))
-            found = self._of_results(at, weights[0][rows, None], weights[1][rows, None], known)
-            sums += found.by_parameters.sum(axis=(0, 1))
+            springs = weights[0][rows, None]
+            adjoint = AdjointRows(at, self._results(springs, weights[1][rows, None]), known)
+            sums += (adjoint.by_numbers(self._change) + self._by_coordinates(at, springs)).sum(axis=(0, 1))
         return pulled.motors, pulled.force, sums
 
     def push(
@@ -184,17 +185,23 @@ class GeneralResponses(RowSolver):
             moved[rows, : n + 3] = whole[..., 0]
         return np.split(moved, range(n, moved.shape[1], 3)[: 1 if kind == "equilibrium" else 2], axis=1)
 
-    def _of_results(self, at: EquilibriumDerivatives, springs: FloatArray, tips: FloatArray, solved: Any = None) -> _Slopes:
-        """Derivatives of weighted elastic coordinates and tips, shapes (N, L, ...); `solved`: see `AdjointRows`."""
+    def _of_results(self, at: EquilibriumDerivatives, springs: FloatArray, tips: FloatArray) -> _Slopes:
+        """Derivatives of weighted elastic coordinates and tips, shapes (N, L, ...)."""
+        found = self._slopes(at, self._results(springs, tips))
+        return found._replace(by_parameters=found.by_parameters + self._by_coordinates(at, springs))
+
+    def _results(self, springs: FloatArray, tips: FloatArray) -> Outputs:
+        """Weighted elastic coordinates and tips as outputs."""
         held = self._model.structure.muscle_lengths
         weights: FloatArray = springs if held is None else np.asarray(springs @ held.elastic)
-        pose = np.concatenate([tips, np.zeros_like(tips)], axis=-1)
-        found = self._slopes(at, Outputs(frame=self._model.tip, pose=pose, strains=weights), solved)
-        if held is not None and np.any(springs):
-            self._check_coordinates()
-            turned = self._change.along("held_elastic", springs[..., None] * at.strains[:, None, None])
-            found = found._replace(by_parameters=found.by_parameters + turned)
-        return found
+        return Outputs(frame=self._model.tip, pose=np.concatenate([tips, np.zeros_like(tips)], axis=-1), strains=weights)
+
+    def _by_coordinates(self, at: EquilibriumDerivatives, springs: FloatArray) -> FloatArray | float:
+        """Derivatives of weighted elastic coordinates through what they mean, shape (N, L, P)."""
+        if self._model.structure.muscle_lengths is None or not np.any(springs):
+            return 0.0
+        self._check_coordinates()
+        return self._change.along("held_elastic", springs[..., None] * at.strains[:, None, None])
 
     def _check_coordinates(self) -> None:
         """Refuse parameters with which the elastic coordinates of given lengths jump, as those of equal sections may."""
@@ -209,8 +216,8 @@ class GeneralResponses(RowSolver):
         weights = np.eye(self._model.n_motors)[self._model.actuators.feels]
         return self._slopes(at, Outputs(loads=np.tile(weights, (len(at.strains), 1, 1))))
 
-    def _slopes(self, at: EquilibriumDerivatives, outputs: Outputs, solved: Any = None) -> _Slopes:
-        rows = AdjointRows(at, outputs, solved)
+    def _slopes(self, at: EquilibriumDerivatives, outputs: Outputs) -> _Slopes:
+        rows = AdjointRows(at, outputs)
         return _Slopes(rows.by_actuators, rows.by_loads()[self._model.tip][..., :3], rows.by_numbers(self._change))
 
     def _chunks(

@@ -109,7 +109,10 @@ class FrictionPoint:
 def check_frictionless(model: Any, what: str) -> SoftModel:
     """Return `model` if it is a `SoftModel` without dry friction, or raise ParameterError; `what` needs that, in words."""
     if check_model(model).structure.friction is not None:
-        requirement = f"a robot without dry friction, for {what}; solve_equilibrium and follow_trajectory have it"
+        requirement = (
+            f"a robot without dry friction, for {what}; solve_equilibrium and follow_trajectory have it, "
+            "bending_friction and guide_friction of 0 leave it out"
+        )
         raise ParameterError("model", model.pinocchio.name, requirement)
     return model  # type: ignore[no-any-return]
 

@@ -25,17 +25,10 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import cross, skew
 from softrobots.model.soft_model import SoftModel
 
-_BASE = np.eye(4)
-_CARRY = np.zeros((6, 6, 6))
-"""Matrices by the force F and moment N beyond: twists (v, omega), times their sum, are (F x omega, F x v + N x omega)."""
-_CARRY[:3, :3, 3:] = _CARRY[:3, 3:, :3] = _CARRY[3:, 3:, 3:] = -skew(np.eye(3))
-
 
 class Topology(NamedTuple):
     """The order and the joints of a robot; the base stands at the end of what has a row for each joint and one for it."""
 
-    jumps: tuple[Any, ...]
-    """Ancestors of the joints and of the base that double in distance from step to step until all reach the base."""
     parents: Any
     """Joint before each joint, shape (n,); -1 at the base."""
     beyond: FloatArray
@@ -51,10 +44,7 @@ def topology(model: SoftModel) -> Topology:
     """Return the order of the joints of a robot and their axes."""
     rigid, data = model.workspace(None)
     parents = np.array(list(rigid.parents)[1:], dtype=np.intp) - 1
-    n, jumps, ancestors = len(parents), [], np.append(parents, -1)
-    while np.any(ancestors >= 0):
-        jumps.append(ancestors)
-        ancestors = ancestors[ancestors]
+    n = len(parents)
     beyond = np.zeros((n, n))
     for joint, supports in enumerate(list(rigid.supports)[1:]):
         beyond[np.array(list(supports)[1:]) - 1, joint] = 1.0
@@ -67,7 +57,7 @@ def topology(model: SoftModel) -> Topology:
     motions[:, 2] = motions[:, 1] @ motions[:, 1]
     motions[:, 3, :3, 3] = axes[:, :3]  # a joint turns or slides
     placements = np.array([one.homogeneous for one in list(rigid.jointPlacements)[1:]]).reshape(n, 1, 4, 4)
-    return Topology(tuple(jumps), parents, beyond, axes, (placements @ motions).reshape(n, 4, 16))
+    return Topology(parents, beyond, axes, (placements @ motions).reshape(n, 4, 16))
 
 
 class _Loaded(NamedTuple):
@@ -76,10 +66,10 @@ class _Loaded(NamedTuple):
     name: str
     body: int
     """Joint that carries it; -1: the base."""
-    arm: FloatArray
-    """Cross-product matrix of its position, shape (N, 3, 3) [m]."""
-    force: FloatArray
-    """That of the force, the same shape [N]."""
+    point: FloatArray
+    """Its position, shape (N, 3) [m]."""
+    wrench: FloatArray
+    """Force on it, then moment, shape (N, 6) [N, N m]."""
 
 
 class LoadedTree:
@@ -101,35 +91,26 @@ class LoadedTree:
         placed = _placed(tree, joints)
         self.rotation, self.position = placed[..., :3, :3], placed[..., :3, 3]
         """Rotation, shape (N, n + 1, 3, 3), and position, (N, n + 1, 3) [m], of the joints, then of the base."""
-        self._to_world = np.zeros((*placed.shape[:2], 6, 6))  # of twists in joints
-        self._to_world[..., :3, :3] = self._to_world[..., 3:, 3:] = self.rotation
-        self._to_world[..., :3, 3:] = skew(self.position) @ self.rotation
-        self.axes = (self._to_world[:, :-1] @ tree.axes[..., None])[..., 0]
+        self._origins, masses = np.ascontiguousarray(self.position[:, :-1]), numbers["masses"]
+        vectors = np.stack([tree.axes[:, :3], tree.axes[:, 3:], masses[:, 1:]], axis=-1)
+        along, about, levers = np.moveaxis(self.rotation[:, :-1] @ vectors, -1, 0)
+        self.axes = np.concatenate([along + cross(self._origins, about), about], axis=-1)
         """World twist of each joint, at the origin, shape (N, n, 6)."""
         wrenches: FloatArray = np.zeros(self.axes.shape)
-        self._gravity, self._turned = loads.get(""), np.zeros((*joints.shape, 3, 6))
+        gravity = loads.get("")
+        self._gravity = None if gravity is None else gravity[:, None]
         if self._gravity is not None:
-            masses, pull = numbers["masses"], -skew(self._gravity)[:, None]
-            self._weights = np.zeros((*joints.shape, 6, 4))  # wrenches of gravity by masses and first moments
-            self._weights[..., :3, 0] = self._gravity[:, None]
-            moments = pull @ placed[:, :-1, :3]
-            self._weights[..., 3:, 0], self._weights[..., 3:, 1:] = moments[..., 3], moments[..., :3]
-            wrenches = (self._weights @ masses[..., None])[..., 0]
-            self._first = (placed[:, :-1, :3] @ masses.take((1, 2, 3, 0), -1)[..., None])[..., 0]
-            self._turned[..., 3:] = -pull @ skew(self._first)
+            self._first = levers + masses[:, :1] * self._origins
+            wrenches[..., :3], wrenches[..., 3:] = masses[:, :1] * self._gravity, cross(self._first, self._gravity)
         self._loaded = []
         for frame, wrench in loads.items():
             if frame:
                 body, _, point = self.frame(frame)
-                arm, force, moment = skew(np.array([point, wrench[:, :3], wrench[:, 3:]]))
-                self._loaded.append(_Loaded(frame, body, arm, force))
+                self._loaded.append(_Loaded(frame, body, point, wrench))
                 if body >= 0:
                     wrenches[:, body] += wrench
-                    wrenches[:, body, 3:] += (arm @ wrench[:, :3, None])[..., 0]
-                    self._turned[:, body, :, 3:] += force @ arm - moment
-        self._turned[..., :3] = -skew(wrenches[..., :3])
+                    wrenches[:, body, 3:] += cross(point, wrench[:, :3])
         self._beyond = tree.beyond @ wrenches
-        self._carry = (self._beyond @ _CARRY.reshape(6, 36)).reshape(*joints.shape, 6, 6)
 
     @property
     def torque(self) -> FloatArray:
@@ -154,9 +135,9 @@ class LoadedTree:
         """
         body, _, point = self.frame(name)
         wrench = weights.copy()
-        wrench[..., 3:] += _products(skew(point), weights[..., :3])
+        wrench[..., 3:] += cross(point[:, None], weights[..., :3])
         beyond = self.topology.beyond[:, body] if body >= 0 else np.zeros(len(self.topology.parents))
-        return wrench[:, None] * beyond[:, None, None], wrench @ self._to_world[:, body]
+        return wrench[:, None] * beyond[:, None, None], self._in_joint(body, wrench)
 
     def twists(self, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Twists, at the origin, of the bodies, and of the joints in the bodies before, at rates of shape (N, L, n)."""
@@ -165,58 +146,78 @@ class LoadedTree:
 
     def work_slopes(self, twists: FloatArray, each: FloatArray) -> FloatArray:
         """Derivatives of the virtual work by the twist of what is from each joint on, shape (N, n, L, 6), from `twists`."""
-        by_twist = (twists - each) @ self._carry
-        carried = twists @ np.swapaxes(self._turned, -1, -2)
+        before, force, moment = twists - each, self._beyond[:, :, None, :3], self._beyond[:, :, None, 3:]
+        by_twist: FloatArray = np.zeros(twists.shape)
+        by_twist[..., :3] = cross(force, before[..., 3:])
+        by_twist[..., 3:] = cross(force, before[..., :3]) + cross(moment, before[..., 3:])
+        carried: FloatArray = np.zeros((*twists.shape[:3], 3))
+        if self._gravity is not None:
+            carried += cross(self._shifts(twists), self._gravity[:, :, None])
+        for one in self._loaded:
+            if one.body >= 0:
+                turn = twists[:, one.body, :, 3:]
+                carried[:, one.body] += cross(self._speed(one, twists)[..., :3], one.wrench[:, None, :3])
+                carried[:, one.body] += cross(turn, one.wrench[:, None, 3:])
         by_twist[..., 3:] += (self.topology.beyond @ carried.reshape(*carried.shape[:2], -1)).reshape(carried.shape)
-        return np.asarray(by_twist)
+        return by_twist
 
     def by_loads(self, twists: FloatArray) -> dict[str, FloatArray]:
         """Derivatives of the virtual work by the wrench at each frame, (N, L, 6), and by gravity, "", (N, L, 3)."""
-        found = {}
-        for one in self._loaded:
-            speed = twists[:, one.body].copy() if one.body >= 0 else np.zeros((len(twists), *twists.shape[2:]))
-            speed[..., :3] -= _products(one.arm, speed[..., 3:])
-            found[one.name] = speed
-        if self._gravity is not None:
-            shifts = self._numbers["masses"][:, :1, None] * twists[..., :3] + cross(twists[..., 3:], self._first[:, :, None])
-            found[""] = shifts.sum(axis=1)
-        return found
+        found = {one.name: self._speed(one, twists) for one in self._loaded}
+        return found if self._gravity is None else found | {"": self._shifts(twists).sum(axis=1)}
 
     def by_masses(self, twists: FloatArray) -> FloatArray | None:
         """Derivatives of the virtual work by mass and first moment of each body, shape (N, n, L, 4); None if weightless."""
-        return None if self._gravity is None else np.asarray(twists @ self._weights)
+        if self._gravity is None:
+            return None
+        gravity = self._gravity[:, :, None]
+        by_mass = ((twists[..., :3] + cross(twists[..., 3:], self._origins[:, :, None])) * gravity).sum(-1, keepdims=True)
+        return np.concatenate([by_mass, cross(gravity, twists[..., 3:]) @ self.rotation[:, :-1]], axis=-1)
 
     def by_frames(self, twists: FloatArray) -> dict[str, FloatArray]:
         """Derivatives of the virtual work by twists of the loaded frames in their joints, shape (N, L, 6)."""
         found = {}
         for one in self._loaded:
             if one.body >= 0:
-                force = _products(one.force, twists[:, one.body, :, 3:])
-                wrench = np.concatenate([force, _products(one.arm, force)], axis=-1)
-                found[one.name] = wrench @ self._to_world[:, one.body]
+                force = cross(one.wrench[:, None, :3], twists[:, one.body, :, 3:])
+                wrench = np.concatenate([force, cross(one.point[:, None], force)], axis=-1)
+                found[one.name] = self._in_joint(one.body, wrench)
         return found
 
     def at_joints(self, by_twist: FloatArray) -> FloatArray:
         """Derivatives by joint positions from those by twists, shape (N, L, n)."""
         return np.swapaxes((by_twist @ self.axes[..., None])[..., 0], 1, 2)
 
-    def at_placements(self, by_twist: FloatArray) -> FloatArray:
-        """Derivatives by twists of the placements of joints in the frames before them, shape (N, n, L, 6), from the same."""
-        return np.asarray(by_twist @ self._to_world[:, self.topology.parents])
+    def at_placements(self, by_twist: FloatArray, joints: Any) -> FloatArray:
+        """Derivatives by twists of the placements of k joints in the frames before them, shape (N, k, L, 6), from the same."""
+        return self._in_joint(self.topology.parents[joints], by_twist[:, joints])
 
+    def _in_joint(self, joints: Any, wrenches: FloatArray) -> FloatArray:
+        """Wrenches at the origin, shape (N, ..., L, 6), seen from joints, shape (...)."""
+        moved = wrenches.copy()
+        moved[..., 3:] -= cross(self.position[:, joints, None], wrenches[..., :3])
+        both = moved.reshape(*moved.shape[:-2], -1, 3) @ self.rotation[:, joints]
+        return np.asarray(both.reshape(moved.shape))
 
-def _products(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
-    """Products of matrices, shape (N, 3, 3), with L vectors each, (N, L, 3)."""
-    return np.asarray(vectors @ np.swapaxes(matrices, -1, -2))
+    def _speed(self, one: _Loaded, twists: FloatArray) -> FloatArray:
+        """Velocity and turn of a loaded frame, shape (N, L, 6)."""
+        speed: FloatArray = twists[:, one.body].copy() if one.body >= 0 else np.zeros((len(twists), *twists.shape[2:]))
+        speed[..., :3] += cross(speed[..., 3:], one.point[:, None])
+        return speed
+
+    def _shifts(self, twists: FloatArray) -> FloatArray:
+        """Rate of mass times position of each body, shape (N, n, L, 3)."""
+        masses = self._numbers["masses"][:, :1, None]
+        return np.asarray(masses * twists[..., :3] + cross(twists[..., 3:], self._first[:, :, None]))
 
 
 def _placed(tree: Topology, joints: FloatArray) -> FloatArray:
     """Placement of each joint, and of the base, in the world, shape (N, n + 1, 4, 4)."""
-    count, n = joints.shape
-    motion = np.ones((count, n, 1, 4))
-    motion[..., 0, 1], motion[..., 0, 2], motion[..., 0, 3] = np.sin(joints), 1.0 - np.cos(joints), joints
-    placed = np.zeros((count, n + 1, 4, 4))
-    placed[:, :n], placed[:, n] = (motion @ tree.motions).reshape(count, n, 4, 4), _BASE
-    for ancestors in tree.jumps:
-        placed = placed[:, ancestors] @ placed
-    return placed
+    q = joints.T
+    motion = np.stack([np.ones_like(q), np.sin(q), 1.0 - np.cos(q), q], axis=-1)
+    own = (motion @ tree.motions).reshape(*q.shape, 4, 4)
+    placed = np.zeros((len(q) + 1, q.shape[1], 4, 4))
+    placed[-1] = np.eye(4)
+    for joint, before in enumerate(tree.parents):
+        np.matmul(placed[before], own[joint], out=placed[joint])
+    return placed.swapaxes(0, 1)
