@@ -18,7 +18,7 @@ from softrobots.compiled.motion.unrolled_motion import (
 )
 from softrobots.compiled.trace.blocks import Block, hoist
 from softrobots.compiled.trace.complex_numbers import of_parts, parts_of
-from softrobots.compiled.trace.expressions import Expression, Scalar, cosine, sine
+from softrobots.compiled.trace.expressions import Scalar, cosine, sine
 
 
 @dataclass(frozen=True)
@@ -86,7 +86,7 @@ def _middle_blocks(plan: MotionPlan, prepare: Block) -> tuple[list[Block], int]:
     correct = Block("motion_correct", "Evaluate; write the correction with the factors that are there.", trace=prepare.trace)
     kept = correct.loads(layout.prepared, len(factors))
     correct.store_all(layout.correction, solved(kept[:n], _rows(kept, n), rest))
-    moving = [*kept, *(one for values in state for one in values)]
+    moving = [*kept, *(one for begin in (layout.unknown, layout.rate, layout.acceleration) for one in correct.loads(begin, n))]
     first = layout.prepared + len(factors)
     return [factor, correct], first + hoist([factor, correct], prepare, moving, first)
 
@@ -116,7 +116,7 @@ def _stage_blocks(plan: MotionPlan, prepare: Block) -> tuple[list[Block], int]:
     both = [[correct.load(torques + 2 * row + stage) for row in range(n)] for stage in range(2)]
     found = corrections(solved(kept[:n], _rows(kept, n), right_hand_side(*both)))
     correct.store_all(layout.correction, [one for part in found for one in part])
-    varying: list[Expression] = [one for values in (*state, *last) for one in values]
+    varying = [one for values in (*state, *last) for one in values]
     size = first + hoist([evaluate, factor], prepare, varying, first)
     return [place, evaluate, factor, correct], size
 
