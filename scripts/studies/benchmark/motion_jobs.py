@@ -103,7 +103,7 @@ def reference(duration: float, rows: int) -> FloatArray:
 
 
 def _arm(settings: Settings) -> Outcome:
-    """The inflatable arm of three motors and four springs, let go for ten seconds; MuJoCo is tuned for the error of our steps."""
+    """The inflatable arm of three motors and four springs, let go for ten seconds; MuJoCo is tuned for the error of ours."""
     model, motors = arm(), (0.3, 0.6, -0.8)
     start = solve_equilibrium(model, motors, force=(0.0, 10.0, -15.0), gravity=EARTH_GRAVITY)
     released = Released(start, EARTH_GRAVITY, 1e-3, _ARM_ROW, 5 if settings.quick else 100)
