@@ -4,8 +4,8 @@
     base_rotation: [0.0, 0.0, 0.02]  # rotation vector [rad]
     markers: [{name: ball, frame: tip, offset: [0.015, 0.0, 0.04]}]
 
-In the description the robot stands on the link `measured`, in whose axes loads are then given and positions are told, and each
-marker is a link without mass.
+In the description the robot stands on the link `world`, in whose axes loads are then given and positions are told, and each
+marker is a link without mass, which `softrobots urdf --check` tells, since some tools take such links for a kilogram.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from softrobots.description.rigid_tree import Placement, number_text
 from softrobots.description.sources import Robot
 from softrobots.robots.parameter_file import read_parameters, robot_of
 
-MEASURED = "measured"
+WORLD = "world"
 """Name of the link on which the robot stands."""
 
 _NOTHING = (0.0, 0.0, 0.0)
@@ -109,9 +109,9 @@ class RobotPlacement:
             root.appendChild(link)
             root.appendChild(joint)
         angles = Placement.moved("revolute", finite_array("base_rotation", self.rotation, (3,), "rad"), 1.0).rpy
-        base = f'<robot name="{MEASURED}"><link name="{MEASURED}"/></robot>'
+        base = f'<robot name="{WORLD}"><link name="{WORLD}"/></robot>'
         name = root.getAttribute("name")
-        return mount(base, MEASURED, dom.toxml(), prefix="", xyz=self.position, rpy=angles, name=name)
+        return mount(base, WORLD, dom.toxml(), prefix="", xyz=self.position, rpy=angles, name=name)
 
 
 def read_placed_robot(path: str | os.PathLike[str], robot: str | None = None) -> Robot | str:
