@@ -116,8 +116,8 @@ def _columns(where: str, names: Sequence[str], required: Sequence[str], optional
         allowed = [f"{', '.join(required)} are required, each once"] if required else []
         allowed += [f"{', '.join(optional)} at most once"] if optional else []
         missing = ", ".join(name for name in required if name not in names)
-        what = f"{named[:500] or 'nothing'}{f', and not {missing}' if missing else ''}"
-        raise FileFormatError(f"{where}: it names {what}; {', and '.join(allowed)}")
+        lacks = f"; {missing} are missing" if missing else ""
+        raise FileFormatError(f"{where}: it names {named[:500] or 'nothing'}; {', and '.join(allowed)}{lacks}")
     return (*(name for name in optional if name in names), *required)
 
 
