@@ -116,7 +116,7 @@ def _columns(where: str, names: Sequence[str], required: Sequence[str], optional
         allowed = [f"{', '.join(required)} are required, each once"] if required else []
         allowed += [f"{', '.join(optional)} at most once"] if optional else []
         missing = ", ".join(name for name in required if name not in names)
-        lacks = f"; {missing} are missing" if missing else ""
+        lacks = f"; missing: {missing}" if missing else ""
         raise FileFormatError(f"{where}: it names {named[:500] or 'nothing'}; {', and '.join(allowed)}{lacks}")
     return (*(name for name in optional if name in names), *required)
 

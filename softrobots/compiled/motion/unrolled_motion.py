@@ -31,7 +31,7 @@ from softrobots.model.serial_chain import bodies_of
 _UP = constants([0.0, 0.0, 1.0])
 
 
-class Joint(NamedTuple):
+class _Joint(NamedTuple):
     """An element at its coordinate."""
 
     element: TracedElement
@@ -59,7 +59,7 @@ def state_of(plan: MotionPlan, block: Block) -> State:
     return [block.loads(place, layout.unknowns) for place in (layout.unknown, layout.rate, layout.acceleration)]
 
 
-def joints_of(plan: MotionPlan, block: Block, state: State, bends: Sequence[tuple[Scalar, Scalar]] = ()) -> list[Joint]:
+def joints_of(plan: MotionPlan, block: Block, state: State, bends: Sequence[tuple[Scalar, Scalar]] = ()) -> list[_Joint]:
     """Return the elements at the motors of the workspace and the unknowns of a state; `bends`: their cosines and sines."""
     unknowns = plan.unknowns
     rows = range(len(unknowns.chain.elements))
@@ -76,7 +76,7 @@ def joints_of(plan: MotionPlan, block: Block, state: State, bends: Sequence[tupl
             axes = turned_by(axes, *bends[unknowns.place[unknowns.moving(row)[0]]])
         else:
             axes = turned(axes, element.coordinates[0])
-        joints.append(Joint(element, axes, origin, inertia))
+        joints.append(_Joint(element, axes, origin, inertia))
     return joints
 
 
@@ -88,7 +88,7 @@ def tip_position(plan: MotionPlan, block: Block) -> list[Scalar]:
     return list(tip)
 
 
-def residual(plan: MotionPlan, block: Block, joints: Sequence[Joint], state: State) -> list[Scalar]:
+def residual(plan: MotionPlan, block: Block, joints: Sequence[_Joint], state: State) -> list[Scalar]:
     """Return the torque out of balance on each unknown [N m or N]."""
     unknowns, layout = plan.unknowns, plan.layout
     chain = unknowns.chain
@@ -126,7 +126,7 @@ def residual(plan: MotionPlan, block: Block, joints: Sequence[Joint], state: Sta
     return [one + damping[row] @ vector(rates) for row, one in enumerate(total)]
 
 
-def newton_matrix(plan: MotionPlan, block: Block, joints: Sequence[Joint]) -> Any:
+def newton_matrix(plan: MotionPlan, block: Block, joints: Sequence[_Joint]) -> Any:
     """Return `A`, shape (n, n)."""
     unknowns, layout = plan.unknowns, plan.layout
     n, (half, quarter) = layout.unknowns, plan.factors(block)

@@ -103,7 +103,7 @@ def _stage_blocks(plan: MotionPlan, prepare: Block) -> tuple[list[Block], int]:
     evaluate = Block("stage_torques", "Write the torques out of balance at both stages.", trace=trace, loop=("stage", 2))
     state = [[evaluate.load(begin + 2 * row, "stage") for row in range(n)] for begin in (unknown, rate, change)]
     bends = [(cosine(one), sine(one)) for one in state[0]]
-    for row, torque in enumerate(residual(plan, evaluate, joints_of(plan, evaluate, state, bends), state)):
+    for row, torque in enumerate(residual(plan, evaluate, joints_of(plan, evaluate, state), state)):
         for begin, value in zip((torques, cosines, sines), (torque, *bends[row]), strict=True):
             evaluate.store(begin + 2 * row, value, "stage")
     factor = Block("stage_factors", "Factor the matrix of a step at the second stage.", trace=trace)

@@ -133,14 +133,12 @@ def hoist(
 
 
 def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool, base: str = "") -> Iterator[tuple[str, bool]]:
-    """Return statements, and whether they depend on a base; all do if it is empty. Others have names that these can use."""
+    """Return statements, and whether they depend on a base; all do if it is empty. Others have names."""
     expressions = in_order([value for _, _, value in stores])
-    varying = {one.number for one in expressions if not base or (one.operation == "load" and one.arguments[1] == base)}
-    for one in expressions:
-        if any(operand.number in varying for operand in one.operands):
-            varying.add(one.number)
-    named = {operand.number for one in expressions if one.number in varying for operand in one.operands}
-    named = (named | {value.number for _, _, value in stores if isinstance(value, Expression)}) - varying
+    standing: set[int] = set()
+    for one in expressions if base else ():
+        if one.arguments[1:2] != (base,) and all(operand.number in standing for operand in one.operands):
+            standing.add(one.number)
     uses = Counter(one.number for expression in expressions for one in expression.operands)
     uses.update(value.number for _, _, value in stores if isinstance(value, Expression))
     texts: dict[int, tuple[str, int]] = {}  # by number: text and how strongly it binds
@@ -153,8 +151,8 @@ def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool, base: st
             expression.operation == "load" and expression.arguments[0] == WORKSPACE and expression.arguments[1:] in written
         )
         shared = uses[expression.number] > 1 and expression.operation != "neg"
-        if changed or shared or len(text) > _WIDEST or expression.number in named:
-            yield f"x{names} = {text}", expression.number in varying
+        if changed or shared or len(text) > _WIDEST or expression.number in standing:
+            yield f"x{names} = {text}", expression.number not in standing
             text, strength = f"x{names}", 4
             names += 1
         texts[expression.number] = (text, strength)
