@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,8 +12,10 @@ from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
+from softrobots.environment.single_pairs import single_pair
 
 _NOBODY = np.zeros(0, dtype=np.intp)
+_FEW = 8  # pairs of core and body up to which plain numbers take less time than NumPy
 INSIDE = 2
 """Feature of the minimum between the ends of a core; 0 and 1 are start and end, larger numbers crossed borders."""
 
@@ -34,6 +37,10 @@ class Candidates(NamedTuple):
     """Their distances from the obstacles, shape (m,) [m]."""
     normals: FloatArray
     """Normals from obstacle to robot, shape (m, 3)."""
+
+
+NOTHING = Candidates([], _NOBODY, _NOBODY, _NOBODY, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+"""No candidate."""
 
 
 def find_candidates(
@@ -75,7 +82,8 @@ def find_candidates(
             counted = cores.counted.take(near, 0)
             if standing is not None:
                 counted &= ~standing[cores.end_numbers[near], which[:, None]]
-            new = _near(field, places, near, which, counted, limits, merged)
+            few = len(near) <= _FEW and field.single(0) is not None
+            new = (_few if few else _near)(field, places, near, which, counted, limits, merged)
         if len(new.capsules):
             found.append(Candidates(new.parts, new.capsules, numbers.take(new.obstacles), *new[3:]))
     if pairs is not None:
@@ -83,7 +91,7 @@ def find_candidates(
     if len(found) == 1:
         return found[0]
     if not found:
-        return Candidates([], _NOBODY, _NOBODY, _NOBODY, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
+        return NOTHING
     parts = [part for one in found for part in one.parts]
     return Candidates(parts, *(np.concatenate(column) for column in zip(*(one[1:] for one in found), strict=True)))
 
@@ -100,6 +108,30 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
     standing = np.zeros(distances.shape, dtype=bool)
     standing[cores.at_base[rows[inside]], which[inside]] = True
     return standing
+
+
+def _few(field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, limits: FloatArray, merged: float) -> Candidates:
+    """The same as `_near`, in plain numbers."""
+    keys, rows = list[tuple[int, int, int]](), list[tuple[float, ...]]()
+    pairs = zip(one.tolist(), other.tolist(), counted.tolist(), limits.take(one).tolist(), strict=True)
+    for capsule, number, ends, limit in pairs:
+        body: Any = field.single(number)
+        (start, end), span = places.ends[capsule].tolist(), places.spans[capsule].tolist()
+        (x, y, z), (a, b, c), (u, v, w) = start, body.centre, span
+        local = body.into((x - a, y - b, z - c)), body.into(span)
+        for feature, share, distance, normal in single_pair(body, *local, math.hypot(u, v, w), limit, merged):
+            if feature >= INSIDE:
+                point = x + share * u, y + share * v, z + share * w
+            elif ends[feature] and distance <= limit:
+                point = end if feature else start
+            else:
+                continue
+            keys.append((capsule, number, feature))
+            rows.append((*point, distance, *body.out(normal)))
+    if not rows:
+        return NOTHING
+    (capsules, which, features), table = np.array(keys).T, np.array(rows)
+    return Candidates([(field, which)], capsules, which, features, table[:, :3], table[:, 3], table[:, 4:])
 
 
 def _near(

@@ -15,9 +15,8 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import cross
+from softrobots.environment.single_bodies import ON_BORDER, Body
 
-ON_BORDER = 1e-9
-"""Distance beyond a face, over that from the body, below which a point belongs to the face; exact at crossed borders."""
 _TINY = 1e-300
 _RADIAL = np.array([1.0, 1.0, 0.0])
 
@@ -45,6 +44,9 @@ class Field(Protocol):
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and `t^T H t` of directions `t`, shape (m, 3): shape (m,) [1/m]."""
+
+    def single(self, number: int) -> Body | None:
+        """A body in plain numbers; None if it has no closed form."""
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Shares `s` of the way, shape (m, k), where `start + s span` crosses between features; any number if it does not."""
@@ -82,6 +84,9 @@ class HalfSpaces(NamedTuple):
         """Distance, normal and zero."""
         return *self.at(points, which), np.zeros(len(points))
 
+    def single(self, number: int) -> None:
+        """None: they need none."""
+
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """None: one face."""
         return np.zeros((len(starts), 0))
@@ -104,6 +109,12 @@ def _turned_out(rotations: FloatArray, which: Any, vectors: FloatArray) -> Float
     if len(rotations) == 1:
         return vectors.dot(rotations[0].T)  # type: ignore[no-any-return]
     return np.asarray(np.matvec(rotations.take(which, 0), vectors))
+
+
+def _single(rotations: FloatArray, centres: FloatArray, number: int, *sizes: Any) -> Body:
+    """A body in plain numbers."""
+    rows: Any = rotations[number].tolist()
+    return Body(rows, centres[number].tolist(), *sizes)
 
 
 class _Around(NamedTuple):
@@ -133,11 +144,18 @@ class RoundedBoxes:
     def __init__(self, rotations: FloatArray, centres: FloatArray, halves: FloatArray, radii: FloatArray) -> None:
         """Take the axes, shape (n, 3, 3), centres, shape (n, 3), half the edges, shape (n, 3), and radii, shape (n,) [m]."""
         self.rotations, self.centres, self.halves, self.radii = rotations, centres, halves, radii
-        self._thin, self._faces = halves == 0.0, bool(halves.any())
+        self._thin, self._faces, self._singles = halves == 0.0, bool(halves.any()), dict[int, Body]()
         rows, longest = np.arange(len(halves)), halves.argmax(axis=1)
         others = np.sort(halves, axis=1)[:, :2]
         around = radii + np.hypot(others[:, 0], others[:, 1])
         self._around = _Around(rotations[rows, :, longest], centres, halves[rows, longest], around)
+
+    def single(self, number: int) -> Body:
+        """A body in plain numbers."""
+        if number not in self._singles:
+            halves, radius = tuple(self.halves[number].tolist()), float(self.radii[number])
+            self._singles[number] = _single(self.rotations, self.centres, number, halves, radius, False)
+        return self._singles[number]
 
     def _beyond(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
         """Points in the axes of the bodies, how far beyond the faces, the same or zero, and the distance from the box."""
@@ -216,7 +234,14 @@ class Cylinders:
     def __init__(self, rotations: FloatArray, centres: FloatArray, halves: FloatArray, radii: FloatArray) -> None:
         """Take axes, z along the axis, shape (n, 3, 3), centres, shape (n, 3), half the lengths, and radii, shape (n,) [m]."""
         self.rotations, self.centres, self.halves, self.radii = rotations, centres, halves, radii
-        self._around = _Around(rotations[:, :, 2], centres, halves, radii)
+        self._around, self._singles = _Around(rotations[:, :, 2], centres, halves, radii), dict[int, Body]()
+
+    def single(self, number: int) -> Body:
+        """A body in plain numbers."""
+        if number not in self._singles:
+            radius, half = float(self.radii[number]), float(self.halves[number])
+            self._singles[number] = _single(self.rotations, self.centres, number, (radius, radius, half), 0.0, True)
+        return self._singles[number]
 
     def _at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance, and normal in the axes of the body."""

@@ -9,17 +9,18 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.environment.distance_fields import Field
 
-_MAX_ITERATIONS = 60
-_SLOPE = 1e-13
+MAX_ITERATIONS = 60
+"""Most steps to a minimum."""
+SLOPE = 1e-13
 """Slope of the distance along the core at which the minimum is found; the distance is then exact to rounding."""
-_PARALLEL = 1e-12
+PARALLEL = 1e-12
 """Curvature along the core, times distance from the feature, below which the nearest point is not unique: ends and borders hold
 the gap then."""
-_ROUND = 0.1
+ROUND = 0.1
 """The same, above which a minimum stands for a border of its feature that is nearer than half the distance."""
-
-
-_NARROW, _TINY = 1e-15, 1e-300
+NARROW = 1e-15
+"""Difference of shares that is none."""
+_TINY = 1e-300
 _BOTH, _ENDS = np.array([0, 1]), np.array([[0.0, 1.0]])
 
 
@@ -104,11 +105,11 @@ def core_points(
         share, points_there, distance, normal, bend = _minimum(field, bodies, begins, ways, lengths, *tables)
         round_here = bend * (np.maximum(distance, 0.0) + field.radii.take(bodies))
         way = share * lengths
-        unique = (way > merged) & (way < lengths - merged) & ((round_here > _PARALLEL) | (distance <= merged))
+        unique = (way > merged) & (way < lengths - merged) & ((round_here > PARALLEL) | (distance <= merged))
         for border in (place - 1, place) if len(used) else ():  # before and after the minimum
             at = np.minimum(np.maximum(border, 0), len(used) - 1)
             apart = np.abs(shares[rows, at + 1] - share) * lengths
-            stands = unique & ((apart <= merged) | ((apart <= 0.5 * distance) & (round_here > _ROUND)))
+            stands = unique & ((apart <= merged) | ((apart <= 0.5 * distance) & (round_here > ROUND)))
             keep[rows, at] &= ~stands
         good = (unique & (distance <= limits.take(rows))).nonzero()[0]
         zeros = np.zeros(len(good), dtype=np.intp)
@@ -158,15 +159,15 @@ def _minimum(
     if not (rise > 0.0).all():
         guess, rise = slopes, slopes[:, 1] - slopes[:, 0]
     share = lower - (upper - lower) * guess[:, 0] / rise
-    for _ in range(_MAX_ITERATIONS):
+    for _ in range(MAX_ITERATIONS):
         points = starts + share[:, None] * spans
         distance, normal, bend = field.along(points, which, along)
         slope = np.vecdot(normal, along)
-        waiting = np.abs(slope) > _SLOPE
+        waiting = np.abs(slope) > SLOPE
         if not waiting.any():
             break
         lower, upper = np.where(slope < 0.0, share, lower), np.where(slope > 0.0, share, upper)
-        waiting &= upper - lower > _NARROW
+        waiting &= upper - lower > NARROW
         if not waiting.any():
             break
         trial = share - slope / (np.where(bend > 0.0, bend, np.inf) * length)

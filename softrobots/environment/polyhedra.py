@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import cross
 from softrobots.environment.convex_mesh import Hull
-from softrobots.environment.distance_fields import ON_BORDER
+from softrobots.environment.single_bodies import ON_BORDER
 
 _TOLERANCE = 1e-12  # of Coal; the nearest point is then within 1e-6 of the size
 _TOUCHING = 1e-7  # of the size: faces that hold the nearest point
@@ -64,6 +64,9 @@ class Polyhedra:
         axes, curvatures = self.curvature(points, which, *found)
         turned = (axes @ directions[:, :, None])[:, :, 0]
         return *found, (curvatures * turned * turned).sum(axis=1)
+
+    def single(self, number: int) -> None:
+        """None: Coal finds nearest points."""
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where the nearest point passes from a face to an edge (two columns an edge), or from an edge to a corner (two)."""

@@ -17,8 +17,9 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import axes_along, cross
 from softrobots.environment.cores import CorePlaces, Cores
-from softrobots.environment.distance_fields import ON_BORDER, RoundedBoxes
+from softrobots.environment.distance_fields import RoundedBoxes
 from softrobots.environment.nearest_points import core_points
+from softrobots.environment.single_bodies import ON_BORDER
 from softrobots.model.soft_model import SoftModel
 
 _SINGULAR = 1e-12
