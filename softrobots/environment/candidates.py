@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,10 +11,11 @@ from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
+from softrobots.environment.single_bodies import Body
 from softrobots.environment.single_pairs import single_pair
 
 _NOBODY = np.zeros(0, dtype=np.intp)
-_FEW = 8  # pairs of core and body up to which plain numbers take less time than NumPy
+_FEW = 40  # ends times bodies up to which plain numbers take less time than NumPy
 INSIDE = 2
 """Feature of the minimum between the ends of a core; 0 and 1 are start and end, larger numbers crossed borders."""
 
@@ -64,6 +64,11 @@ def find_candidates(
     found: list[Candidates] = []
     for field, numbers in fields:
         distances = field.at_least(ends)
+        if distances.size <= _FEW and field.single(0) is not None:
+            new = _few(field, cores, places, distances.tolist(), margin, merged)
+            if len(new.capsules):
+                found.append(new._replace(obstacles=numbers.take(new.obstacles)))
+            continue
         standing = _standing(field, cores, ends, distances) if len(cores.at_base) else None
         if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
             touching = distances <= limits.take(cores.end_capsules)[:, None]
@@ -82,8 +87,7 @@ def find_candidates(
             counted = cores.counted.take(near, 0)
             if standing is not None:
                 counted &= ~standing[cores.end_numbers[near], which[:, None]]
-            few = len(near) <= _FEW and field.single(0) is not None
-            new = (_few if few else _near)(field, places, near, which, counted, limits, merged)
+            new = _near(field, places, near, which, counted, limits, merged)
         if len(new.capsules):
             found.append(Candidates(new.parts, new.capsules, numbers.take(new.obstacles), *new[3:]))
     if pairs is not None:
@@ -110,28 +114,43 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
     return standing
 
 
-def _few(field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, limits: FloatArray, merged: float) -> Candidates:
-    """The same as `_near`, in plain numbers."""
-    keys, rows = list[tuple[int, int, int]](), list[tuple[float, ...]]()
-    pairs = zip(one.tolist(), other.tolist(), counted.tolist(), limits.take(one).tolist(), strict=True)
-    for capsule, number, ends, limit in pairs:
-        body: Any = field.single(number)
-        (start, end), span = places.ends[capsule].tolist(), places.spans[capsule].tolist()
-        (x, y, z), (a, b, c), (u, v, w) = start, body.centre, span
-        local = body.into((x - a, y - b, z - c)), body.into(span)
-        for feature, share, distance, normal in single_pair(body, *local, math.hypot(u, v, w), limit, merged):
-            if feature >= INSIDE:
-                point = x + share * u, y + share * v, z + share * w
-            elif ends[feature] and distance <= limit:
-                point = end if feature else start
-            else:
+def _few(field: Field, cores: Cores, places: CorePlaces, bounds: Any, margin: float, merged: float) -> Candidates:
+    """The same for few ends and bodies, in plain numbers; `bounds` of distances, a list of those of an end from each body."""
+    keys, rows, plain = list[tuple[int, int, int]](), list[tuple[float, ...]](), cores.plain
+    for capsule, (ends, counted, radius, length) in enumerate(plain):
+        firsts, lasts, limit, corners = bounds[ends[0]], bounds[ends[1]], margin + radius, None
+        for number, first in enumerate(firsts):
+            if first + lasts[number] > 2.0 * limit + length:
                 continue
-            keys.append((capsule, number, feature))
-            rows.append((*point, distance, *body.out(normal)))
+            body: Any = field.single(number)
+            a, b, c = body.centre
+            (start, end), span = corners = corners or (places.ends[capsule].tolist(), places.spans[capsule].tolist())
+            (x, y, z), (u, v, w) = start, span
+            for feature, share, distance, normal in single_pair(
+                body, body.into((x - a, y - b, z - c)), body.into(span), length, limit, merged
+            ):
+                if feature >= INSIDE:
+                    point = x + share * u, y + share * v, z + share * w
+                elif distance > limit or not counted[feature] or _stands(cores, places, ends[feature], body):
+                    continue
+                else:
+                    point = end if feature else start
+                keys.append((capsule, number, feature))
+                rows.append((*point, distance, *body.out(normal)))
     if not rows:
         return NOTHING
     (capsules, which, features), table = np.array(keys).T, np.array(rows)
     return Candidates([(field, which)], capsules, which, features, table[:, :3], table[:, 3], table[:, 4:])
+
+
+def _stands(cores: Cores, places: CorePlaces, end: int, body: Body) -> bool:
+    """Whether an end stands on a body; see `_standing`."""
+    base = cores.base_of.get(end)
+    if base is None:
+        return False
+    x, y, z = places.ends.reshape(-1, 3)[cores.single_ends[base]].tolist()
+    a, b, c = body.centre
+    return body.at(body.into((x - a, y - b, z - c)))[0] < float(cores.radii[cores.end_capsules[base]])
 
 
 def _near(

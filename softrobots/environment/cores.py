@@ -68,6 +68,11 @@ class Cores:
         """Different ends at the base, with an end within their radius that no joint moves, and that end, both of shape (k,)."""
         self.base_radii = self.radii[self.end_capsules[self.bases]][:, None]
         """Radii of the latter, shape (k, 1) [m]."""
+        self.base_of = dict(zip(self.at_base.tolist(), self.bases.tolist(), strict=True))
+        """The same by number."""
+        lists = (self.end_numbers.tolist(), self.counted.tolist(), self.radii.tolist(), self.lengths.tolist())
+        self.plain = list(zip(*lists, strict=True))
+        """Ends, whether each is counted, radius and length [m] of each core, in plain numbers."""
         self.fixed = np.flatnonzero(~moving[self.single_ends])
         """Different ends that no joint moves, shape (j,); none on a body beside the chain."""
         self.fixed_points = self.at(pin.neutral(self._model)).ends.reshape(-1, 3)[self.single_ends][self.fixed]

@@ -14,8 +14,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.vectors import cross
-from softrobots.environment.single_bodies import ON_BORDER, Body
+from softrobots.environment.single_bodies import ON_BORDER, Bends, Body, Triple
 
 _TINY = 1e-300
 _RADIAL = np.array([1.0, 1.0, 0.0])
@@ -34,13 +33,8 @@ class Field(Protocol):
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance, shape (m,) [m], and normal, shape (m, 3), at points, shape (m, 3)."""
 
-    def curvature(
-        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        r"""Directions `a`, shape (m, k, 3), and weights `c`, shape (m, k) [1/m]: :math:`H = \sum_k c_k\, a_k a_k^T`.
-
-        Distances and normals are those of `at`.
-        """
+    def bends(self, number: int, point: Triple, distance: float, normal: Triple) -> Bends:
+        """Second derivative of the distance from a body at a point, with the distance and normal of `at`."""
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and `t^T H t` of directions `t`, shape (m, 3): shape (m,) [1/m]."""
@@ -74,11 +68,9 @@ class HalfSpaces(NamedTuple):
         normals = self.normals.take(which, 0)
         return (points * normals).sum(axis=1) - self.offsets.take(which), normals
 
-    def curvature(
-        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Zero: planes."""
-        return np.zeros((len(points), 0, 3)), np.zeros((len(points), 0))
+    def bends(self, number: int, point: Triple, distance: float, normal: Triple) -> Bends:
+        """Nothing: planes."""
+        return []
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance, normal and zero."""
@@ -132,6 +124,8 @@ class _Around(NamedTuple):
     def at_least(self, points: FloatArray) -> FloatArray:
         """Distance of each point from each capsule."""
         ways = points[:, None] - self.centres
+        if not self.halves.any():  # spheres
+            return np.asarray(np.sqrt(np.vecdot(ways, ways)) - self.radii)
         along = np.abs(np.vecdot(ways, self.axes))
         beyond = np.maximum(along - self.halves, 0.0)
         squares = np.maximum(np.vecdot(ways, ways) - along * along, 0.0)
@@ -195,17 +189,9 @@ class RoundedBoxes:
         size = ((np.add.reduce(curved, 1) > 1) & (distances > _TINY)) / np.maximum(distances, _TINY)
         return curved, size
 
-    def curvature(
-        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """One over the distance, in the coordinates that are beyond faces and across the normal; zero at faces."""
-        turned = _turned_into(self.rotations, which, normals)
-        curved, size = self._round(which, turned, distances + _of(self.radii, which))
-        if not size.any():  # faces
-            return np.zeros((len(points), 0, 3)), np.zeros((len(points), 0))
-        size = size[:, None]
-        directions = np.concatenate([self.rotations.take(which, 0).swapaxes(1, 2), normals[:, None]], axis=1)
-        return directions, np.concatenate([curved * size, -size], axis=1)
+    def bends(self, number: int, point: Triple, distance: float, normal: Triple) -> Bends:
+        """Second derivative of the distance."""
+        return self.single(number).bends(distance, normal)
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and the second derivative."""
@@ -280,15 +266,9 @@ class Cylinders:
         distance, normal = self._at(points, which)
         return distance, _turned_out(self.rotations, which, normal)
 
-    def curvature(
-        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Around the axis at side and rim, and across the rim."""
-        outward, across, size = self._round(which, _turned_into(self.rotations, which, normals), distances)
-        axes = self.rotations.take(which, 0).swapaxes(1, 2)
-        outward = _turned_out(self.rotations, which, outward)
-        directions = np.stack([cross(axes[:, 2], outward), outward, axes[:, 2], normals], axis=1)
-        return directions, np.stack([across, size, size, -size], axis=1)
+    def bends(self, number: int, point: Triple, distance: float, normal: Triple) -> Bends:
+        """Second derivative of the distance."""
+        return self.single(number).bends(distance, normal)
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and the second derivative."""

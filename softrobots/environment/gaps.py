@@ -15,19 +15,19 @@ the obstacle (edges, rims), which hold a core that lies flat, where the nearest 
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.vectors import cross, skew
+from softrobots.core.vectors import skew
 from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
 from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores, cores_of
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
 from softrobots.environment.self_contact import relative_curvature, self_contact_pairs
+from softrobots.environment.single_bodies import Bends, inner, times
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
 
@@ -55,6 +55,9 @@ class Gaps:
         self.capsules, self.obstacles, self.features = found.capsules, found.obstacles, found.features
         """Capsule, obstacle and feature of each candidate, shape (m,), integers. Numbers of obstacles beyond the last are
         capsules of the robot itself: the number less that of obstacles."""
+        keys = zip(found.capsules.tolist(), found.obstacles.tolist(), found.features.tolist(), strict=True)
+        self.keys: tuple[tuple[int, int, int], ...] = tuple(keys)
+        """The same of each candidate: what stays the same from one configuration to the next."""
         self.core_points, self.normals = found.points, found.normals
         """Material points of the cores, and normals from obstacle to robot, shape (m, 3)."""
         self.radii: FloatArray = cores.radii.take(found.capsules)
@@ -72,7 +75,8 @@ class Gaps:
         if own:
             rows = (found.obstacles >= len(transforms)).nonzero()[0]
             self.moves[rows] -= cores.moves[found.obstacles[rows] - len(transforms)]
-        wrenches = np.concatenate([found.normals, cross(found.points, found.normals)], axis=1)
+        normals = zip(found.normals.tolist(), found.points.tolist(), strict=True)
+        wrenches = np.array([(*normal, *times(point, normal)) for normal, point in normals]).reshape(-1, 6)
         self.jacobian: FloatArray = wrenches.dot(places.jacobian) * self.moves
         """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
 
@@ -89,11 +93,6 @@ class Gaps:
     def obstacle_points(self) -> FloatArray:
         """Nearest points on the obstacles, shape (m, 3) [m]."""
         return np.asarray(self.core_points - self.distances[:, None] * self.normals)
-
-    @cached_property
-    def keys(self) -> tuple[tuple[int, int, int], ...]:
-        """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next."""
-        return tuple(zip(self.capsules.tolist(), self.obstacles.tolist(), self.features.tolist(), strict=True))
 
     def point_jacobian(self, rows: Any, points: FloatArray) -> FloatArray:
         """Velocity of material points of the robot per joint rate; where it touches itself, relative to the other capsule.
@@ -134,16 +133,24 @@ class Gaps:
             depths = self._cores.radii[others] if normal else np.zeros(len(own))
             points = np.concatenate([points, self.obstacle_points[own] - depths[:, None] * self.normals[own]])
             vectors, moves = np.concatenate([vectors, -vectors[chosen]]), np.concatenate([moves, self._cores.moves[others]])
+        table, potential, size = list[Any](), 0.0, 0.0
+        for v, p in zip(vectors.tolist(), points.tolist(), strict=True):
+            (x, y, z), (a, b, c), work = v, p, inner(v, p)
+            table.append((0.0, z, -y, a * x - work, a * y, a * z))  # three rows of the derivative by turns, -v x (u - p x w)
+            table.append((-z, 0.0, x, b * x, b * y - work, b * z))
+            table.append((y, -x, 0.0, c * x, c * y, c * z - work))
+            table.append((*v, *times(p, v)))
+            potential, size = potential - work, size + math.hypot(x, y, z)
         jacobian, moves = self.places.jacobian, moves[:, None, :]
-        linear, angular = (jacobian[:3] - skew(points) @ jacobian[3:]) * moves, jacobian[3:] * moves
+        products = np.array(table).dot(jacobian).reshape(len(vectors), 4, nv) * moves
         return JointLoad(
-            torque=forces.dot(self.jacobian) if normal else vectors.ravel().dot(linear.reshape(-1, nv)),
-            angular=angular.reshape(-1, nv),
-            by_force=(skew(-vectors) @ linear).reshape(-1, nv),
+            torque=np.add.reduce(products[:, 3]),
+            angular=(jacobian[3:] * moves).reshape(-1, nv),
+            by_force=products[:, :3].reshape(-1, nv),
             by_moment=None,
             gravity_derivative=None,
-            potential=-float(vectors.ravel().dot(points.ravel())),
-            scale=self.reach * sum(map(math.hypot, *vectors.T.tolist())),
+            potential=potential,
+            scale=self.reach * size,
         )
 
     def curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -156,43 +163,46 @@ class Gaps:
             Rows, shape (k, nv), and weights, shape (k,) [N/m]: :math:`\sum f_i\, d^2 g_i` is the derivative of the torque of
             `load(forces)` plus `rows.T @ diag(weights) @ rows`.
         """
-        first, found, weights = 0, list[FloatArray](), list[FloatArray]()
+        first, found, weights = 0, list[FloatArray](), list[Any]()
         for field, which in self.parts:
             if not isinstance(field, HalfSpaces):
                 rows = first + forces[first : first + len(which)].nonzero()[0]
                 if len(rows) and self.obstacles[first] >= len(self._transforms):
                     self._curved_by_itself(rows, forces, found, weights)
-                elif len(rows):
-                    self._curved(field, which.take(rows - first), rows, forces.take(rows), found, weights)
+                else:
+                    self._curved(field, which.take(rows - first).tolist(), rows.tolist(), forces, found, weights)
             first += len(which)
         if not found:
             return self._cores.no_rows
-        return (found[0], weights[0]) if len(found) == 1 else (np.concatenate(found), np.concatenate(weights))
+        return np.concatenate(found), np.concatenate(weights)
 
     def _curved(self, field: Field, which: Any, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
         """Append the terms of the candidates of one field."""
-        directions, curvatures = self.bends(field, which, rows)
-        if not curvatures.shape[1]:
-            return
-        velocity = self.point_jacobian(rows, self.core_points.take(rows, 0))
-        found.append((directions @ velocity).reshape(-1, velocity.shape[2]))
-        weights.append((forces[:, None] * curvatures).ravel())
-        inside = (self.features.take(rows) == INSIDE).nonzero()[0]
-        if not len(inside):
-            return
-        rows, directions = rows.take(inside), directions.take(inside, 0)
-        spans = self.places.spans.take(self.capsules.take(rows), 0)
-        pulls = np.vecmat(curvatures.take(inside, 0) * np.matvec(directions, spans), directions)  # H t
-        bend = np.vecdot(pulls, spans)
-        slides = (bend > 0.0).nonzero()[0]
-        if len(slides):
-            turned = cross(spans, self.normals.take(rows, 0)).dot(self.places.jacobian[3:]) * self.moves.take(rows, 0)
-            found.append((np.vecmat(pulls, velocity.take(inside, 0)) + turned).take(slides, 0))
-            weights.append((-forces.take(inside) / np.where(bend > 0.0, bend, 1.0)).take(slides))
+        wrenches, owners, each = list[Any](), list[int](), list[float]()
+        for row, number in zip(rows, which, strict=True):
+            point, bends = self.core_points[row].tolist(), self.bends(field, number, row)
+            for direction, weight in bends:
+                wrenches.append((*direction, *times(point, direction)))
+                each.append(float(forces[row]) * weight)
+            if bends and self.features[row] == INSIDE:
+                span: Any = self.places.spans[self.capsules[row]].tolist()
+                shares = [weight * inner(direction, span) for direction, weight in bends]
+                x, y, z = (sum(share * a[k] for share, (a, _) in zip(shares, bends, strict=True)) for k in range(3))  # H t
+                bend = inner((x, y, z), span)
+                if bend > 0.0:
+                    (a, b, c), (d, e, f) = times(point, (x, y, z)), times(span, self.normals[row].tolist())
+                    wrenches.append((x, y, z, a + d, b + e, c + f))
+                    each.append(-float(forces[row]) / bend)
+            owners += [row] * (len(wrenches) - len(owners))
+        if wrenches:
+            found.append(np.array(wrenches).dot(self.places.jacobian) * self.moves.take(owners, 0))
+            weights.append(each)
 
-    def bends(self, field: Field, which: Any, rows: Any) -> tuple[FloatArray, FloatArray]:
-        """Directions and curvatures, as `Field.curvature`, of candidates of one field, shape (k,), on its bodies `which`."""
-        return field.curvature(self.core_points.take(rows, 0), which, self.distances.take(rows), self.normals.take(rows, 0))
+    def bends(self, field: Field, number: int, row: int) -> Bends:
+        """Second derivative of the distance of a candidate from a body of a field."""
+        point: Any = self.core_points[row].tolist()
+        normal: Any = self.normals[row].tolist()
+        return field.bends(number, point, float(self.distances[row]), normal)
 
     def _curved_by_itself(self, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
         """Append the terms of candidates of the robot with itself."""

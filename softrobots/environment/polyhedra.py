@@ -11,7 +11,7 @@ from scipy.optimize import nnls
 from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import cross
 from softrobots.environment.convex_mesh import Hull
-from softrobots.environment.single_bodies import ON_BORDER
+from softrobots.environment.single_bodies import ON_BORDER, Bends, Triple, inner
 
 _TOLERANCE = 1e-12  # of Coal; the nearest point is then within 1e-6 of the size
 _TOUCHING = 1e-7  # of the size: faces that hold the nearest point
@@ -44,26 +44,24 @@ class Polyhedra:
         found = [self._nearest(point, body) for point, body in zip(points, which.tolist(), strict=True)]
         return np.array([one.distance for one in found]), np.array([one.normal for one in found]).reshape(-1, 3)
 
-    def curvature(
-        self, points: FloatArray, which: Any, distances: FloatArray, normals: FloatArray
-    ) -> tuple[FloatArray, FloatArray]:
-        """Zero at faces, across the edge at an edge, the same in both directions across the normal at a corner."""
-        directions, curvatures = np.zeros((len(points), 2, 3)), np.zeros((len(points), 2))
-        for row, (point, body) in enumerate(zip(points, which.tolist(), strict=True)):
-            near = self._nearest(point, body)
-            if near.rank > 1:
-                across = cross(near.along, near.normal)
-                across /= np.sqrt(across @ across)
-                directions[row] = across, cross(near.normal, across)
-                curvatures[row] = 1.0 / near.distance, 1.0 / near.distance if near.rank > 2 else 0.0
-        return directions, curvatures
+    def bends(self, number: int, point: Triple, distance: float, normal: Triple) -> Bends:
+        """Nothing at faces, across the edge at an edge, the same in both directions across the normal at a corner."""
+        near = self._nearest(np.array(point), number)
+        if near.rank < 2:
+            return []
+        across = cross(near.along, near.normal)
+        across /= np.sqrt(across @ across)
+        both: Any = [across.tolist(), cross(near.normal, across).tolist()]
+        return [(direction, 1.0 / near.distance) for direction in both[: near.rank - 1]]
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and the second derivative."""
-        found = self.at(points, which)
-        axes, curvatures = self.curvature(points, which, *found)
-        turned = (axes @ directions[:, :, None])[:, :, 0]
-        return *found, (curvatures * turned * turned).sum(axis=1)
+        distances, normals = self.at(points, which)
+        given: Any = zip(
+            which.tolist(), points.tolist(), distances.tolist(), normals.tolist(), directions.tolist(), strict=True
+        )
+        bends = [sum(c * inner(a, way) ** 2 for a, c in self.bends(*one)) for *one, way in given]
+        return distances, normals, np.array(bends)
 
     def single(self, number: int) -> None:
         """None: Coal finds nearest points."""

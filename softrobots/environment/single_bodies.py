@@ -13,6 +13,19 @@ ON_BORDER = 1e-9
 _TINY = 1e-300
 Triple = tuple[float, float, float]
 """A point or a vector."""
+Bends = list[tuple[Triple, float]]
+r"""Directions `a`, world axes, and weights `c` [1/m]: the second derivative of a distance is :math:`\sum c\,a a^T`."""
+
+
+def times(a: Triple, b: Triple) -> Triple:
+    """Return the cross product."""
+    (x, y, z), (u, v, w) = a, b
+    return y * w - z * v, z * u - x * w, x * v - y * u
+
+
+def inner(a: Triple, b: Triple) -> float:
+    """Return the inner product."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
 class Body(NamedTuple):
@@ -70,6 +83,31 @@ class Body(NamedTuple):
             u, v, w = (1.0, 0.0, 0.0) if i == distance else (0.0, 1.0, 0.0) if j == distance else (0.0, 0.0, 1.0)
             return distance - self.radius, (copysign(u, x), copysign(v, y), copysign(w, z))
         return distance - self.radius, (copysign(u / distance, x), copysign(v / distance, y), copysign(w / distance, z))
+
+    def bends(self, distance: float, normal: Triple) -> Bends:
+        """Second derivative of the distance at a point with that distance and normal, world axes.
+
+        Of a box one over the distance from it, in the coordinates that are beyond faces and across the normal; of a cylinder
+        the curvature around the axis at side and rim, and one over the distance across the rim; nothing at faces.
+        """
+        (x, y, z), distance, (first, second, third) = self.into(normal), distance + self.radius, self.rotation
+        if distance <= _TINY:
+            return []
+        size = 1.0 / distance
+        if self.round:
+            radial = hypot(x, y)
+            if radial < _TINY:
+                return []
+            outward = x / radial, y / radial, 0.0
+            around = [(self.out((-outward[1], outward[0], 0.0)), radial / (self.halves[0] + distance * radial))]
+            if radial <= ON_BORDER or abs(z) <= ON_BORDER:
+                return around
+            return [*around, (self.out(outward), size), ((first[2], second[2], third[2]), size), (normal, -size)]
+        curved = [half == 0.0 or abs(n) > ON_BORDER for half, n in zip(self.halves, (x, y, z), strict=True)]
+        if sum(curved) < 2:
+            return []
+        axes = zip(curved, zip(first, second, third, strict=True), strict=True)
+        return [(axis, size) for beyond, axis in axes if beyond] + [(normal, -size)]
 
     def bend(self, distance: float, normal: Triple, way: Triple) -> float:
         """Second derivative of the distance along a direction, in its own axes; `RoundedBoxes.along`, `Cylinders.along`."""

@@ -31,8 +31,8 @@ def turning(gaps: Gaps) -> tuple[FloatArray, FloatArray]:
         first += len(which)
         if isinstance(field, HalfSpaces) or not len(rows):
             continue
-        directions, curvatures = gaps.bends(field, which, rows)
-        hessian = np.swapaxes(directions, 1, 2) @ (curvatures[:, :, None] * directions)
+        bends = [gaps.bends(field, *pair) for pair in zip(which.tolist(), rows.tolist(), strict=True)]
+        hessian = np.array([sum((weight * np.outer(a, a) for a, weight in one), np.zeros((3, 3))) for one in bends])
         spans = gaps.places.spans[gaps.capsules[rows]]
         pulls = (hessian @ spans[:, :, None])[:, :, 0]
         bend = (pulls * spans).sum(axis=1)

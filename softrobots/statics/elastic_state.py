@@ -156,6 +156,13 @@ def _with_curvature(point: Point, reduced: ReducedLoad, touch: Touch) -> Reduced
     )
 
 
+def contact_softening(state: ElasticState, forces: FloatArray) -> FloatArray:
+    """Derivative of the load of normal forces, shape (m,) [N], on the surfaces near a state, shape (n_springs, n_springs)."""
+    touch: Any = state.touch
+    pressed = touch._replace(load=touch.gaps.load(forces), curvature=touch.gaps.curvature(forces))
+    return _with_curvature(state.point, state.point.reduce(pressed.load), pressed).derivative
+
+
 def _out_of_range(model: SoftModel, q_springs: FloatArray, point: Point) -> ElasticState:
     """State of infinite energy, which no solver accepts: a section is beyond its range."""
     n, m = model.n_springs, model.n_motors

@@ -71,11 +71,12 @@ def contact_step(
         lost = 2.0 * float(found[1].sum()) * max(-float(gaps.min(initial=0.0)), 0.0)
         if not np.array_equal(found[1] > 0.0, held) or float(pull @ found[0]) > lost:  # other contacts are pressed, or uphill
             exact, found = False, solve_programme(convex, pull, gradients, -gaps)
-    if found is None or not norm(soft * found[0]) <= longest:
-        exact, found = False, _within(convex, pull, gradients, gaps, longest / soft)
-        if found is None or not np.isfinite(found[0]).all():
-            return None
-    return Step(soft * found[0], found[1], exact and damping == 0.0)
+    if found is not None:
+        step = soft * found[0]
+        if norm(step) <= longest:
+            return Step(step, found[1], exact and damping == 0.0)
+    found = _within(convex, pull, gradients, gaps, longest / soft)
+    return None if found is None or not np.isfinite(found[0]).all() else Step(soft * found[0], found[1], False)
 
 
 def nearest_step(

@@ -21,7 +21,7 @@ from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import softest_motion
 from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step, repairing_step
 from softrobots.statics.contact.touch import NEAR, NO_FORCES, TOUCHING, ForceTable, Touch, unmoved
-from softrobots.statics.elastic_state import ElasticProblem, ElasticState, largest_residual, norm
+from softrobots.statics.elastic_state import ElasticProblem, ElasticState, contact_softening, largest_residual, norm
 
 BALANCED = 1.0
 """Error of an equilibrium, see `Near.error`."""
@@ -109,12 +109,17 @@ class ContactSearch:
         touch, values = here.touch, here.touch.gaps.values
         sizes = np.sqrt(np.vecdot(touch.rows, touch.rows))
         near = (values <= _LARGEST_STEP * sizes).nonzero()[0]
-        rows, held = touch.rows.take(near, 0), touch.forces.take(near) > 0.0
-        limits = _LARGEST_STEP, self._damping
-        found = contact_step(here.state.tangent, here.load, values.take(near), rows, held, self._soft, limits, self._factors)
+        rows, held, tangent = touch.rows.take(near, 0), touch.forces.take(near) > 0.0, here.state.tangent
+        limits, gaps = (_LARGEST_STEP, self._damping), values.take(near)
+        found = contact_step(tangent, here.load, gaps, rows, held, self._soft, limits, self._factors)
+        forces = np.zeros(len(values))
+        if found is not None and found.forces.any() and not held.any():  # the first forces: how they soften counts, too
+            forces[near] = found.forces
+            tangent = tangent - contact_softening(here.state, forces)
+            first, held = found, found.forces > 0.0
+            found = contact_step(tangent, here.load, gaps, rows, held, self._soft, limits, self._factors) or first
         if found is None:
             return None
-        forces = np.zeros(len(values))
         forces[near] = found.forces
         return Step(found.step, forces, found.exact)
 
@@ -174,7 +179,7 @@ class ContactSearch:
         deep = touch.penetration
         closes = deep - max(0.0, -float((touch.gaps.values + touch.rows @ whole).min())) if deep > 0.0 else 0.0
         downhill = float(here.load @ whole)
-        price = max(2.0 * float(step.forces.sum()), 0.5 * self._price, 2.0 * downhill / closes if closes > 0.0 else 0.0)
+        price = max(2.0 * float(np.add.reduce(step.forces)), 0.5 * self._price, 2.0 * downhill / closes if closes > 0.0 else 0.0)
         predicted, self._price = downhill - price * closes, price
         rounding = self.problem.rounding(state) + 1e-15 * price * self._reach
         if predicted > -rounding:

@@ -77,6 +77,8 @@ def _aside(search: ContactSearch, start: FloatArray) -> Iterator[Near]:
 def _of_least_norm(search: ContactSearch, found: Near) -> Near | None:
     """The equilibrium with the contact forces of least norm; None where the forces are unique."""
     reach = search.problem.model.reach
+    if len(found.touch.rows) < 2:
+        return None
     rows = found.touch.rows[found.touch.gaps.values <= TOUCHING * reach]
     if len(rows) < 2 or len(rows) == rows.shape[1] - null_space(rows).shape[1]:
         return None
