@@ -108,60 +108,66 @@ class Gaps:
         return np.asarray((linear - skew(points) @ angular) * self.moves.take(rows, 0)[:, None, :])
 
     def load(self, forces: FloatArray) -> JointLoad:
-        """Return forces on the robot as dead forces at their material points.
+        r"""Return forces on the robot: normal forces, which turn and move as the robot does, or dead ones at material points.
 
         Args:
             forces: Normal forces at the points of the cores, shape (m,) [N]; or forces of any direction, world axes, at the
                 points of the surface, shape (m, 3) [N].
 
         Returns:
-            The load on the joints; its potential is `-sum f . x`.
+            The load on the joints; its potential is `-sum f . x`, that of dead forces. The derivative of normal forces is
+            :math:`\sum f_i\, d^2 g_i`.
         """
-        normal, nv = forces.ndim == 1, self.places.jacobian.shape[1]
+        normal = forces.ndim == 1
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
             return self._cores.no_load
-        normals, points, vectors = self.normals.take(rows, 0), self.core_points.take(rows, 0), forces.take(rows, 0)
-        moves = self._cores.moves.take(self.capsules.take(rows), 0)
-        if normal:
-            vectors = vectors[:, None] * normals
-        else:
-            points = points - self.radii.take(rows)[:, None] * normals
-        if self._own:  # the other capsule takes the opposite force
-            chosen = np.flatnonzero(self.obstacles[rows] >= len(self._transforms))
-            own, others = rows[chosen], self.obstacles[rows[chosen]] - len(self._transforms)
-            depths = self._cores.radii[others] if normal else np.zeros(len(own))
-            points = np.concatenate([points, self.obstacle_points[own] - depths[:, None] * self.normals[own]])
-            vectors, moves = np.concatenate([vectors, -vectors[chosen]]), np.concatenate([moves, self._cores.moves[others]])
+        count, loads, capsules = len(self._transforms), list[tuple[Any, Any]](), list[int]()
+        points = (self.core_points if normal else self.points).tolist()
+        for row in rows.tolist():
+            capsule, other, _ = self.keys[row]
+            force = (forces[row] * self.normals[row] if normal else forces[row]).tolist()
+            loads.append((force, points[row]))
+            capsules.append(capsule)
+            if other >= count:  # the other capsule takes the opposite force
+                depth = float(self._cores.radii[other - count]) if normal else 0.0
+                point = self.core_points[row] - (self.distances[row] + depth) * self.normals[row]
+                loads.append(([-one for one in force], point.tolist()))
+                capsules.append(other - count)
         table, potential, size = list[Any](), 0.0, 0.0
-        for v, p in zip(vectors.tolist(), points.tolist(), strict=True):
+        for v, p in loads:
             (x, y, z), (a, b, c), work = v, p, inner(v, p)
             table.append((0.0, z, -y, a * x - work, a * y, a * z))  # three rows of the derivative by turns, -v x (u - p x w)
             table.append((-z, 0.0, x, b * x, b * y - work, b * z))
             table.append((y, -x, 0.0, c * x, c * y, c * z - work))
             table.append((*v, *times(p, v)))
             potential, size = potential - work, size + math.hypot(x, y, z)
-        jacobian, moves = self.places.jacobian, moves[:, None, :]
-        products = np.array(table).dot(jacobian).reshape(len(vectors), 4, nv) * moves
+        jacobian, moves = self.places.jacobian, self._cores.moves.take(capsules, 0)[:, None, :]
+        nv = jacobian.shape[1]
+        products = np.array(table).dot(jacobian).reshape(-1, 4, nv) * moves
+        angular, by_force = (jacobian[3:] * moves).reshape(-1, nv), products[:, :3].reshape(-1, nv)
+        if normal:
+            curved, weights = self._curvature(forces)
+            if len(weights):
+                angular, by_force = np.concatenate([angular, (curved.T * weights).T]), np.concatenate([by_force, curved])
         return JointLoad(
             torque=np.add.reduce(products[:, 3]),
-            angular=(jacobian[3:] * moves).reshape(-1, nv),
-            by_force=products[:, :3].reshape(-1, nv),
+            angular=angular,
+            by_force=by_force,
             by_moment=None,
             gravity_derivative=None,
             potential=potential,
             scale=self.reach * size,
         )
 
-    def curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
         r"""What the second derivatives of the gaps have beside those of dead forces.
 
         Args:
             forces: Normal forces, shape (m,) [N].
 
         Returns:
-            Rows, shape (k, nv), and weights, shape (k,) [N/m]: :math:`\sum f_i\, d^2 g_i` is the derivative of the torque of
-            `load(forces)` plus `rows.T @ diag(weights) @ rows`.
+            Rows, shape (k, nv), and weights, shape (k,) [N/m], of `rows.T @ diag(weights) @ rows`.
         """
         first, found, weights = 0, list[FloatArray](), list[Any]()
         for field, which in self.parts:

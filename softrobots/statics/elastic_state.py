@@ -85,12 +85,10 @@ class ElasticProblem:
             return _out_of_range(self.model, q_springs, point)
         touch = None
         joints = self._applied.nothing or self._applied.at(self.model.embed(point.joints))
-        if self._surfaces is None:
-            reduced = point.reduce(joints)
-        else:
+        if self._surfaces is not None:
             touch = self._surfaces.at(self.model.embed(point.joints), point, forces, near)
             joints = joined(joints, touch.load)
-            reduced = _with_curvature(point, point.reduce(joints), touch)
+        reduced = point.reduce(joints)
         stored, torques, stiffness = self._springs.at(q_springs)
         residual = torques - reduced.elastic
         tangent = stiffness - reduced.derivative
@@ -144,23 +142,10 @@ def _evaluated(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, lo
     return problem.state(q_springs, ForceTable.of(state.touch.gaps, forces)) if forces.any() else state
 
 
-def _with_curvature(point: Point, reduced: ReducedLoad, touch: Touch) -> ReducedLoad:
-    """Add the curvature of gaps to the derivatives of a load."""
-    rows, weights = touch.curvature
-    if not len(weights):
-        return reduced
-    by_motors, by_springs = point.columns(rows)
-    weighted = by_springs.T * weights
-    return reduced._replace(
-        derivative=reduced.derivative + weighted.dot(by_springs), coupling=reduced.coupling + weighted.dot(by_motors)
-    )
-
-
 def contact_softening(state: ElasticState, forces: FloatArray) -> FloatArray:
     """Derivative of the load of normal forces, shape (m,) [N], on the surfaces near a state, shape (n_springs, n_springs)."""
     touch: Any = state.touch
-    pressed = touch._replace(load=touch.gaps.load(forces), curvature=touch.gaps.curvature(forces))
-    return _with_curvature(state.point, state.point.reduce(pressed.load), pressed).derivative
+    return state.point.reduce(touch.gaps.load(forces)).derivative
 
 
 def _out_of_range(model: SoftModel, q_springs: FloatArray, point: Point) -> ElasticState:

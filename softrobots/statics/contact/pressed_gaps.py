@@ -57,14 +57,8 @@ def motor_slopes(state: ElasticState, load: Load) -> tuple[FloatArray, FloatArra
 
     Shapes (n_motors, n_motors) and (n_motors, n_springs); see `Point.motor_derivatives`.
     """
-    applied, touch = AppliedLoad(state.model, load).at(state.q), state.touch
-    if touch is None:
-        return state.point.motor_derivatives(applied)
-    by_motors, by_springs = state.point.motor_derivatives(joined(applied, touch.load))
-    rows, weights = touch.curvature
-    motors, springs = state.point.columns(rows)
-    bent = motors.T * weights
-    return by_motors + bent @ motors, by_springs + bent @ springs
+    applied = AppliedLoad(state.model, load).at(state.q)
+    return state.point.motor_derivatives(applied if state.touch is None else joined(applied, state.touch.load))
 
 
 def whole_stiffness(state: ElasticState, load: Load) -> FloatArray:

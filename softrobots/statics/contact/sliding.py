@@ -137,12 +137,10 @@ class SlidingRobot:
         """Return applied load, contact and friction on the joints, at the coordinates asked last."""
         place = self.at
         load = joined(place.applied, place.gaps.load(normal))
-        rows, weights = place.gaps.curvature(normal)
-        more = rows.T @ (weights[:, None] * rows)
-        if friction.any():
-            forces = world(place.tangents, friction)
-            load = joined(load, place.gaps.load(forces))
-            more += self._turning(place.gaps, forces)
+        if not friction.any():
+            return load
+        forces = world(place.tangents, friction)
+        load, more = joined(load, place.gaps.load(forces)), self._turning(place.gaps, forces)
         gravity = load.gravity_derivative
         return load._replace(gravity_derivative=more if gravity is None else gravity + more)
 

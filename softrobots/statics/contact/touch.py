@@ -43,9 +43,7 @@ class Touch(NamedTuple):
     forces: FloatArray
     """Normal forces, shape (m,) [N]."""
     load: JointLoad
-    """Load of the forces on the joints, as dead forces."""
-    curvature: tuple[FloatArray, FloatArray]
-    """What their derivative has beside that of dead forces, by the joints; see `Gaps.curvature`."""
+    """Load of the forces on the joints."""
     surroundings: Surroundings
     """The robot among the obstacles."""
     penetration: float
@@ -114,7 +112,7 @@ class NearSurfaces:
         on_motors, on_springs = point.columns(gaps.jacobian)
         each = forces.at(gaps)
         deepest = max(0.0, -float(np.minimum.reduce(gaps.values))) if len(gaps.values) else 0.0
-        return Touch(gaps, on_springs, on_motors, each, gaps.load(each), gaps.curvature(each), self._surroundings, deepest)
+        return Touch(gaps, on_springs, on_motors, each, gaps.load(each), self._surroundings, deepest)
 
 
 def joined(applied: JointLoad, contact: JointLoad) -> JointLoad:
