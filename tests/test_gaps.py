@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+import math
 from collections.abc import Callable
 from pathlib import Path
 
@@ -22,6 +23,7 @@ from softrobots.environment.nearest_points import core_points
 from softrobots.environment.obstacle_fields import obstacle_fields
 from softrobots.environment.obstacles import Obstacle
 from softrobots.environment.self_contact import self_contact_pairs
+from softrobots.environment.single_pairs import single_pair
 from softrobots.model.joint_loads import Entries
 
 POSITION, ROTATION = (0.7, 0.1, -0.25), Rotation.from_rotvec([0.3, -0.5, 0.8]).as_matrix()
@@ -195,11 +197,11 @@ def test_two_faces_that_meet_at_a_corner_alone_are_a_corner() -> None:
     for x, y in ((0.0, 0.0), (0.05, 0.0), (0.0, -0.05)):
         point = np.array([[x, y, 1.5]])
         distance, normal = field.at(point, np.zeros(1, dtype=int))
-        directions, weights = field.curvature(point, np.zeros(1, dtype=int), distance, normal)
+        bends = field.bends(0, (x, y, 1.5), float(distance[0]), tuple(normal[0].tolist()))
         away = np.array([x, y, 0.5])
         assert distance[0] == pytest.approx(np.linalg.norm(away), abs=1e-15)
         expected = (np.eye(3) - np.outer(normal[0], normal[0])) / distance[0]
-        assert np.allclose(np.einsum("k,ki,kj", weights[0], directions[0], directions[0]), expected, atol=1e-12)
+        assert np.allclose(sum(weight * np.outer(a, a) for a, weight in bends), expected, atol=1e-12)
 
 
 def test_neighbours_do_not_touch_each_other(arm: sr.SoftModel) -> None:
@@ -408,5 +410,10 @@ def test_no_gap_between_the_ends_is_missed_at_special_places(kind: str) -> None:
     every = field.at(points, np.zeros(len(points), dtype=int))[0]
     assert (field.at_least(points)[:, 0] - every).max() < 1e-7  # on an axis a difference of squares is left
     sampled = every.reshape(401, -1).min(axis=0)
-    assert (least - sampled).max() < 1e-12
-    assert (sampled - least).max() < 5e-3
+    body, plain = field.single(0), []
+    for start, end in zip(starts.tolist(), ends.tolist(), strict=True):
+        among = single_pair(body, body.seen(start), body.seen(end), math.dist(start, end), 9.0, 1e-9)
+        plain.append(min(one.distance for one in among))
+    for one in (least, np.array(plain)):
+        assert (one - sampled).max() < 1e-12
+        assert (sampled - one).max() < 5e-3

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +12,6 @@ from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
-from softrobots.environment.single_bodies import Body
 from softrobots.environment.single_pairs import single_pair
 
 _NOBODY = np.zeros(0, dtype=np.intp)
@@ -63,12 +63,12 @@ def find_candidates(
     limits, ways = margin + cores.radii, 2.0 * margin + cores.ways
     found: list[Candidates] = []
     for field, numbers in fields:
-        distances = field.at_least(ends)
-        if distances.size <= _FEW and field.single(0) is not None:
-            new = _few(field, cores, places, distances.tolist(), margin, merged)
+        if len(ends) * len(numbers) <= _FEW and field.single(0) is not None:
+            new = _few(field, cores, ends.tolist(), len(numbers), margin, merged)
             if len(new.capsules):
                 found.append(new._replace(obstacles=numbers.take(new.obstacles)))
             continue
+        distances = field.at_least(ends)
         standing = _standing(field, cores, ends, distances) if len(cores.at_base) else None
         if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
             touching = distances <= limits.take(cores.end_capsules)[:, None]
@@ -114,43 +114,33 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
     return standing
 
 
-def _few(field: Field, cores: Cores, places: CorePlaces, bounds: Any, margin: float, merged: float) -> Candidates:
-    """The same for few ends and bodies, in plain numbers; `bounds` of distances, a list of those of an end from each body."""
-    keys, rows, plain = list[tuple[int, int, int]](), list[tuple[float, ...]](), cores.plain
-    for capsule, (ends, counted, radius, length) in enumerate(plain):
-        firsts, lasts, limit, corners = bounds[ends[0]], bounds[ends[1]], margin + radius, None
-        for number, first in enumerate(firsts):
-            if first + lasts[number] > 2.0 * limit + length:
+def _few(field: Field, cores: Cores, ends: Any, count: int, margin: float, merged: float) -> Candidates:
+    """The same for few ends, a list of points, and the `count` bodies of a field, in plain numbers."""
+    bodies: list[Any] = [field.single(number) for number in range(count)]
+    table = [[body.seen(end) for body in bodies] for end in ends]
+    keys, rows = list[tuple[int, int, int]](), list[tuple[float, ...]]()
+    for capsule, (numbers, counted, radius, length) in enumerate(cores.plain):
+        (x, y, z), (u, v, w) = start, end = ends[numbers[0]], ends[numbers[1]]
+        limit = margin + radius
+        for which, (body, first, last) in enumerate(zip(bodies, table[numbers[0]], table[numbers[1]], strict=True)):
+            if first.distance + last.distance > 2.0 * limit + length:
                 continue
-            body: Any = field.single(number)
-            a, b, c = body.centre
-            (start, end), span = corners = corners or (places.ends[capsule].tolist(), places.spans[capsule].tolist())
-            (x, y, z), (u, v, w) = start, span
-            for feature, share, distance, normal in single_pair(
-                body, body.into((x - a, y - b, z - c)), body.into(span), length, limit, merged
-            ):
+            for feature, share, distance, normal in single_pair(body, first, last, length, limit, merged):
                 if feature >= INSIDE:
-                    point = x + share * u, y + share * v, z + share * w
-                elif distance > limit or not counted[feature] or _stands(cores, places, ends[feature], body):
-                    continue
-                else:
+                    point = x + share * (u - x), y + share * (v - y), z + share * (w - z)
+                elif distance <= limit and counted[feature]:
                     point = end if feature else start
-                keys.append((capsule, number, feature))
+                    base, near = cores.base_of.get(numbers[feature], (0, -math.inf))
+                    if table[base][which].distance < near:  # it stands there
+                        continue
+                else:
+                    continue
+                keys.append((capsule, which, feature))
                 rows.append((*point, distance, *body.out(normal)))
     if not rows:
         return NOTHING
     (capsules, which, features), table = np.array(keys).T, np.array(rows)
     return Candidates([(field, which)], capsules, which, features, table[:, :3], table[:, 3], table[:, 4:])
-
-
-def _stands(cores: Cores, places: CorePlaces, end: int, body: Body) -> bool:
-    """Whether an end stands on a body; see `_standing`."""
-    base = cores.base_of.get(end)
-    if base is None:
-        return False
-    x, y, z = places.ends.reshape(-1, 3)[cores.single_ends[base]].tolist()
-    a, b, c = body.centre
-    return body.at(body.into((x - a, y - b, z - c)))[0] < float(cores.radii[cores.end_capsules[base]])
 
 
 def _near(

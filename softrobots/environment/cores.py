@@ -68,8 +68,9 @@ class Cores:
         """Different ends at the base, with an end within their radius that no joint moves, and that end, both of shape (k,)."""
         self.base_radii = self.radii[self.end_capsules[self.bases]][:, None]
         """Radii of the latter, shape (k, 1) [m]."""
-        self.base_of = dict(zip(self.at_base.tolist(), self.bases.tolist(), strict=True))
-        """The same by number."""
+        bases = zip(self.bases.tolist(), self.base_radii[:, 0].tolist(), strict=True)
+        self.base_of = dict(zip(self.at_base.tolist(), bases, strict=True))
+        """The same by number: that end, and its radius."""
         lists = (self.end_numbers.tolist(), self.counted.tolist(), self.radii.tolist(), self.lengths.tolist())
         self.plain = list(zip(*lists, strict=True))
         """Ends, whether each is counted, radius and length [m] of each core, in plain numbers."""

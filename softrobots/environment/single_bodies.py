@@ -28,6 +28,17 @@ def inner(a: Triple, b: Triple) -> float:
     return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 
 
+class Seen(NamedTuple):
+    """A point in the axes of a body."""
+
+    point: Triple
+    """The point [m]."""
+    distance: float
+    """Its distance from the body [m]."""
+    normal: Triple
+    """Normal there."""
+
+
 class Body(NamedTuple):
     """A rounded box (a box, a sphere, a capsule) or a cylinder, placed in the world."""
 
@@ -58,6 +69,12 @@ class Body(NamedTuple):
         (a, b, c), (d, e, f), (g, h, i) = self.rotation
         x, y, z = vector
         return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+
+    def seen(self, point: Triple) -> Seen:
+        """Distance and normal at a point in world axes."""
+        (x, y, z), (a, b, c) = point, self.centre
+        local = self.into((x - a, y - b, z - c))
+        return Seen(local, *self.at(local))
 
     def at(self, point: Triple) -> tuple[float, Triple]:
         """Distance [m] and normal at a point, in its own axes; `RoundedBoxes.at`, `Cylinders.at`."""

@@ -6,7 +6,7 @@ from math import inf
 from typing import NamedTuple
 
 from softrobots.environment.nearest_points import MAX_ITERATIONS, NARROW, PARALLEL, ROUND, SLOPE
-from softrobots.environment.single_bodies import Body, Triple
+from softrobots.environment.single_bodies import Body, Seen, Triple
 
 
 class Found(NamedTuple):
@@ -22,17 +22,17 @@ class Found(NamedTuple):
     """Normal in the axes of the body."""
 
 
-def single_pair(body: Body, start: Triple, span: Triple, length: float, limit: float, merged: float) -> list[Found]:
-    """Find the candidates of a core; arguments as of `nearest_points.core_points`, in the axes of the body.
+def single_pair(body: Body, start: Seen, end: Seen, length: float, limit: float, merged: float) -> list[Found]:
+    """Find the candidates of a core between two points; the other arguments as of `nearest_points.core_points`.
 
     Start and end are first, whatever their distance; the others are within `limit`.
     """
-    (a, b, c), (u, v, w) = start, span
-    (first, n), (last, m) = body.at(start), body.at((a + u, b + v, c + w))
+    ((a, b, c), first, n), (point, last, m) = start, end
+    u, v, w = span = point[0] - a, point[1] - b, point[2] - c
     low, high = n[0] * u + n[1] * v + n[2] * w, m[0] * u + m[1] * v + m[2] * w  # slopes over shares
     between, found, kept = low < 0.0 < high, [Found(0, 0.0, first, n), Found(1, 1.0, last, m)], list[Found]()
     before, after = (0.0, first, low, 0), (1.0, last, high, 1)  # the neighbours of the minimum
-    for place, share in enumerate(body.borders(start, span)):
+    for place, share in enumerate(body.borders(start.point, span)):
         if not 0.0 < share < 1.0:
             continue
         if not between and max(first + share * low, last + (share - 1.0) * high) > limit:
@@ -47,7 +47,7 @@ def single_pair(body: Body, start: Triple, span: Triple, length: float, limit: f
             kept.append(Found(feature, share, distance, n))
     hidden: tuple[int, ...] = ()
     if between:
-        least, bend = _minimum(body, start, span, length, before, after)
+        least, bend = _minimum(body, start.point, span, length, before, after)
         way, round_here = least.share * length, bend * (max(least.distance, 0.0) + (body.rounded))
         if merged < way < length - merged and (round_here > PARALLEL or least.distance <= merged):
             near = [abs(beside[0] - least.share) * length for beside in (before, after)]
