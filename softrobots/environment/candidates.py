@@ -139,8 +139,8 @@ def _few(field: Field, cores: Cores, ends: Any, count: int, margin: float, merge
                 rows.append((*point, distance, *body.out(normal)))
     if not rows:
         return NOTHING
-    (capsules, which, features), table = np.array(keys).T, np.array(rows)
-    return Candidates([(field, which)], capsules, which, features, table[:, :3], table[:, 3], table[:, 4:])
+    (capsules, others, features), found = np.array(keys).T, np.array(rows)
+    return Candidates([(field, others)], capsules, others, features, found[:, :3], found[:, 3], found[:, 4:])
 
 
 def _near(

@@ -179,9 +179,8 @@ class ContactSearch:
         deep = touch.penetration
         closes = deep - max(0.0, -float((touch.gaps.values + touch.rows @ whole).min())) if deep > 0.0 else 0.0
         downhill = float(here.load @ whole)
-        price = max(
-            2.0 * np.add.reduce(step.forces).item(), 0.5 * self._price, 2.0 * downhill / closes if closes > 0.0 else 0.0
-        )
+        pressed, least = 2.0 * float(step.forces.sum()), 2.0 * downhill / closes if closes > 0.0 else 0.0
+        price = max(pressed, 0.5 * self._price, least)
         predicted, self._price = downhill - price * closes, price
         rounding = self.problem.rounding(state) + 1e-15 * price * self._reach
         if predicted > -rounding:
