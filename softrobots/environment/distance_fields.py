@@ -124,8 +124,6 @@ class _Around(NamedTuple):
     def at_least(self, points: FloatArray) -> FloatArray:
         """Distance of each point from each capsule."""
         ways = points[:, None] - self.centres
-        if not self.halves.any():  # spheres
-            return np.asarray(np.sqrt(np.vecdot(ways, ways)) - self.radii)
         along = np.abs(np.vecdot(ways, self.axes))
         beyond = np.maximum(along - self.halves, 0.0)
         squares = np.maximum(np.vecdot(ways, ways) - along * along, 0.0)
