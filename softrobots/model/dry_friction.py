@@ -140,6 +140,21 @@ class DryFriction:
             stiffness += paths.stiffening(pull) + slips.T @ (sticking[:, None] * slips)
         return energy, torque, stiffness
 
+    def parts(self, strains: FloatArray, memory: FrictionMemory, grip: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the friction of each part over its limit, and the torque on the strains at the limit.
+
+        Parts are both ways of bending of the sections, then guides. Shapes (2 n_sections + n_guides,) and (same, count).
+        """
+        apart = strains[self.places] - memory.bending
+        shares = (apart / np.maximum(np.linalg.norm(apart, axis=1), BENDING_STICK)[:, None]).ravel()
+        torques: FloatArray = np.repeat(self.limit, 2)[:, None] * np.eye(self._count)[self.places.ravel()]
+        if not self.guided:
+            return shares, torques
+        paths = self._paths.at(strains)
+        slips = np.clip(self._slipped(paths.pieces, memory) / self._stick, -1.0, 1.0)
+        pulls = -grip[:, None] * self._beyond @ paths.piece_arms
+        return np.concatenate([shares, slips]), np.concatenate([torques, pulls])
+
     def sticks(self, strains: FloatArray, memory: FrictionMemory) -> bool:
         """Return whether nothing slips at strains, shape (count,)."""
         apart = np.linalg.norm(strains[self.places] - memory.bending, axis=1)
