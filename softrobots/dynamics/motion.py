@@ -27,7 +27,7 @@ class MotionEnergy(Summarised):
     potential: FloatArray
     """Potential energy of the weight."""
     dissipated: FloatArray
-    """What dampers have taken."""
+    """What dampers and dry friction have taken."""
     load_work: FloatArray
     """Work of forces and wrenches."""
     motor_work: FloatArray

@@ -92,15 +92,16 @@ class DryFriction:
         pieces = self._paths.at(self._relaxed).pieces if self.guided else np.zeros(0)
         return FrictionMemory(self._relaxed[self.places], np.zeros(self.n_guides), pieces)
 
-    def after(self, strains: FloatArray, memory: FrictionMemory) -> FrictionMemory:
-        """Return the memory after a step to strains, shape (count,)."""
+    def after(self, strains: FloatArray, memory: FrictionMemory, place: FloatArray | None = None) -> FrictionMemory:
+        """Return the memory after a step to strains, shape (count,); if they are `place` in truth, the sliders move along."""
+        place = strains if place is None else place
         apart = strains[self.places] - memory.bending
         share = np.minimum(1.0, BENDING_STICK / np.maximum(np.linalg.norm(apart, axis=1), BENDING_STICK))
-        bending = strains[self.places] - apart * share[:, None]
+        bending = place[self.places] - apart * share[:, None]
         if not self.guided:
             return FrictionMemory(bending, memory.slip, memory.pieces)
-        pieces = self._paths.at(strains).pieces
-        slip = np.clip(self._slipped(pieces, memory), -self._stick, self._stick)
+        slip = np.clip(self._slipped(self._paths.at(strains).pieces, memory), -self._stick, self._stick)
+        pieces = self._paths.at(place).pieces
         return FrictionMemory(read_only(bending), read_only(slip), read_only(pieces))
 
     def grip(self, strains: FloatArray, tensions: FloatArray, memory: FrictionMemory) -> FloatArray:

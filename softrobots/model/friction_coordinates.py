@@ -7,13 +7,13 @@ from __future__ import annotations
 
 import copy
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.model.coordinates import Coordinates, Point, ReducedLoad
 from softrobots.model.dry_friction import DryFriction, FrictionMemory
@@ -200,6 +200,26 @@ def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: Fl
     if not change <= _RUNAWAY * largest:
         return model, math.inf
     return _rubbed(model, last.memory, grip), change / max(largest, 1e-300)
+
+
+def packed_memories(models: Sequence[SoftModel]) -> dict[str, list[FloatArray]]:
+    """Return what dry friction remembers in each of some states of a robot, in named arrays; none without friction."""
+    if models[0].structure.friction is None:
+        return {}
+    memories = [memory_of(model)._asdict() for model in models]
+    return {f"friction_{name}": [memory[name] for memory in memories] for name in FrictionMemory._fields}
+
+
+def with_memories(fields: Mapping[str, Any], model: SoftModel, count: int) -> list[SoftModel]:
+    """Return a robot with each of a number of memories of dry friction, from the arrays of `packed_memories`."""
+    if model.structure.friction is None:
+        return [model] * count
+    shapes = [part.shape for part in memory_of(model)]
+    columns = [
+        finite_array(name, fields[name], (count, *shape))
+        for name, shape in zip((f"friction_{name}" for name in FrictionMemory._fields), shapes, strict=True)
+    ]
+    return [remembering(model, FrictionMemory(*parts)) for parts in zip(*columns, strict=True)]
 
 
 def _rubbing(coordinates: Any) -> FrictionCoordinates:

@@ -170,7 +170,7 @@ def estimate_load(
         LoadNotFound: If no force explains the torques; carries the best estimate.
         NeutralEquilibrium: If the search meets a load at which the tangent stiffness is singular.
     """
-    choice("method", method, METHODS)
+    choice("method", method, METHODS if environment is None else METHODS[:1])
     if method == "alternation":
         check_frictionless(model, "an estimate by 'alternation' ('newton' takes it)")
     instance_of("restart", restart, bool, "True or False")
@@ -182,7 +182,6 @@ def estimate_load(
     span = _span(directions)
     if method == "alternation" and directions is not None:
         raise ParameterError("directions", directions, "None for 'alternation', which finds forces of any direction")
-    choice("method", method, METHODS if environment is None else METHODS[:1])
     base = Load.of(model, frame=at, gravity=gravity, environment=environment)
     most = 100 if method == "newton" else 1000
     most = most if max_iterations is None else positive_integer("max_iterations", max_iterations)
