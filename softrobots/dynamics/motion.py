@@ -46,7 +46,7 @@ class MotionState(Summarised):
     """State of a robot in motion, from which `simulate` can start."""
 
     model: SoftModel
-    """The robot."""
+    """The robot, with what its dry friction remembers."""
     time: float
     """Time in the motion that it is taken from [s]."""
     q_motors: FloatArray
