@@ -92,6 +92,21 @@ def test_the_derivatives_are_those_of_small_steps_on_from_there(rng: np.random.G
     assert found.singular_values == pytest.approx(np.linalg.svd(slope)[1], rel=1e-4)
 
 
+def test_a_robot_with_friction_may_lean_on_a_wall() -> None:
+    """Against the wall goes what no motor feels; the other components come back, and the range is theirs."""
+    model = sr.load_model(sr.TendonArm(bending_friction=5e-4))
+    before = sr.solve_equilibrium(model, model.relaxed_motors - (2e-3, 0, 0, 0, 0, 0, 0, 0, 0))
+    wall = sr.Environment([sr.HalfSpace((-1.0, 0.0, 0.0), 0.003 - before.tip_position[0])])
+    force = np.array([0.02, 0.01, 0.05])
+    leaning = sr.solve_equilibrium(model, before.q_motors, force, previous=before, environment=wall)
+    assert sum(contact.normal_force for contact in leaning.contacts) > 0.1
+    found = sr.estimate_load(model, before.q_motors, leaning.motor_torques, previous=before, environment=wall, restart=False)
+    assert found.force[1:] == pytest.approx(force[1:], abs=1e-7)
+    assert np.abs(found.unobservable_directions) == pytest.approx(np.array([[1.0, 0.0, 0.0]]), abs=1e-6)
+    low, high = found.friction_range.T  # type: ignore[union-attr]
+    assert np.all((low[1:] < force[1:]) & (force[1:] < high[1:]))
+
+
 def test_an_estimate_with_friction_is_saved_and_told(rng: np.random.Generator, tmp_path: Path) -> None:
     model, before, motors = around(rng, bending_friction=5e-4)
     torques = sr.solve_equilibrium(model, motors, (0.1, 0.0, 0.1), previous=before).motor_torques

@@ -8,8 +8,8 @@ The displacement from the slider :math:`\xi` follows from its value before as
 .. math:: \xi_1 = \xi_0 + h \dot z_1 = 4 z_m - 3 z_0 - h \dot z_0 - c_0
 
 with the strains in the middle, :math:`z_m`, and the slider `c_0` before, as far as the stick; beyond it the slider follows. At
-rest the strains have the friction that statics remembers. While parts slip in one direction steps keep their second order; a
-part that turns round or comes to rest does so within a step, and makes an error of first order.
+rest the strains have the friction that statics remembers. While parts slip in one direction steps keep their second order; the
+error is of first order where the direction turns, or a part turns round or comes to rest within a step.
 """
 
 from __future__ import annotations
