@@ -199,9 +199,7 @@ def test_what_has_no_friction_refuses_it() -> None:
     found = sr.solve_equilibrium(model, rest)
     for call in (
         lambda: sr.compile(model),
-        lambda: sr.simulate(model, 0.1, rest),
         lambda: sr.vibration_modes(model, found),
-        lambda: sr.estimate_load(model, rest, found.motor_torques),
         lambda: sr.critical_load(model, rest, (0.0, 0.0, -1.0)),
         lambda: sr.solve_imposed_displacement(model, rest, displacement=0.001, direction=(1.0, 0.0, 0.0)),
     ):

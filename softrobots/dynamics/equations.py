@@ -24,9 +24,11 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.dynamics.friction_steps import StepFriction
 from softrobots.model.actuators import Drives
 from softrobots.model.coordinates import Point
-from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.dry_friction import FrictionMemory
+from softrobots.model.muscle_length_point import MuscleLengthPoint
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_jacobian
 from softrobots.statics.loads import AppliedLoad, Load
@@ -50,7 +52,10 @@ class EquationsOfMotion:
             damping: `D` of the elastic coordinates, shape (n_springs, n_springs); None: none.
             drives: Rotors, `A`, and viscous friction of the actuators, where they move by their force; None: neither acts.
         """
-        self.model, self.gravity = check_frictionless(model, "motion"), gravity
+        self.model, self.gravity = model, gravity
+        self.friction = None if model.structure.friction is None else StepFriction(model)
+        """Dry friction in the step that is being taken; None if there is none."""
+        self._coordinates = model.coordinates if self.friction is None else self.friction.coordinates
         self.n_motors, self.n = model.n_motors, model.n_motors + model.n_springs
         weightless = 0.0, 0.0, 0.0  # for the workspace; Pinocchio's own model has gravity
         self._pinocchio, self._data = model.workspace(weightless if gravity is None else gravity)
@@ -79,8 +84,48 @@ class EquationsOfMotion:
         key = x.tobytes()
         if self._last is None or self._last[0] != key:
             kept = x.copy()
-            self._last = key, self.model.coordinates.at(kept[: self.n_motors], kept[self.n_motors :])
+            self._last = key, self._coordinates.at(kept[: self.n_motors], kept[self.n_motors :])
         return self._last[1]
+
+    def begin_step(self, memory: FrictionMemory | None, x: FloatArray, rates: FloatArray, length: float) -> None:
+        """Begin a step of a length [s] from coordinates and rates, each shape (n,), with what dry friction remembers there."""
+        if self.friction is not None and memory is not None:
+            self.friction.begin(memory, self.strains(x), self.strain_rates(x, rates), length)
+            self._last = None
+
+    def grip(self, x: FloatArray, forces: FloatArray) -> bool:
+        """Let the friction of guides follow what acts on the actuators in the middle of a step, shape (n,); False without."""
+        if self.friction is None or not self.friction.guided:
+            return False
+        self.friction.grip(self.strains(x), forces[len(self.model.structure.motor_joints) : self.n_motors])
+        self._last = None
+        return True
+
+    def end_step(self, middle: FloatArray, rates: FloatArray, end: FloatArray) -> tuple[FrictionMemory | None, float]:
+        """Return what dry friction remembers after a step, and the power that it takes [W].
+
+        Args:
+            middle: Coordinates in the middle, shape (n,).
+            rates: Their rates, shape (n,).
+            end: Coordinates at the end, shape (n,).
+        """
+        if self.friction is None:
+            return None, 0.0
+        strains = self.strains(middle)
+        power = float(self.friction.torque(strains) @ self.strain_rates(middle, rates))
+        return self.friction.end(strains, self.strains(end)), power
+
+    def strains(self, x: FloatArray) -> FloatArray:
+        """Strains at coordinates, shape (n_strains,)."""
+        return self.model.structure.strains(x[: self.n_motors], x[self.n_motors :])
+
+    def strain_rates(self, x: FloatArray, rates: FloatArray) -> FloatArray:
+        """Rates of the strains at coordinates and rates, each shape (n,); shape (n_strains,)."""
+        m, point = self.n_motors, self.point(x)
+        if not isinstance(point, MuscleLengthPoint):
+            return rates[m:]
+        by_lengths, by_free = point.strain_slopes
+        return np.asarray(by_lengths @ rates[m - by_lengths.shape[1] : m] + by_free @ rates[m:])
 
     def balance(self, x: FloatArray, rates: FloatArray, accelerations: FloatArray, wrenches: Mapping[str, FloatArray]) -> Any:
         """What has to act on each coordinate from outside; see the module.

@@ -24,8 +24,10 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.dynamics.friction_steps import LineSearch
 from softrobots.dynamics.motor_torque import MotorTorque
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
+from softrobots.model.dry_friction import FrictionMemory
 
 CHANGE = 1e-13
 """Change of the coordinates at the middle, relative to max(1, |y|), below which an iteration ends a step."""
@@ -33,6 +35,8 @@ ROUNDED = 1e-9
 """The same, below which an iteration that no longer shrinks has reached rounding."""
 ITERATIONS = 30
 """Most iterations of a step."""
+RUBBING_ITERATIONS = 100
+"""The same of a robot with dry friction, with the attempts along a change."""
 RENEWED = 8
 """Iteration after which the matrix is computed again."""
 SLOW = 0.1
@@ -51,6 +55,8 @@ class State(NamedTuple):
     """Actuators, then elastic coordinates, shape (n,) [rad, m or N]."""
     rates: FloatArray
     """Their rates, shape (n,)."""
+    memory: FrictionMemory | None = None
+    """What dry friction of the body remembers; None if it has none."""
 
 
 class Stage(NamedTuple):
@@ -128,7 +134,7 @@ class MidpointRule:
         self._block: Any = np.ix_(self.free, self.free) if torque else (self._at, self._at)
         self._damping = equations.damping[self._block]
         self._known: tuple[float, FloatArray] | None = None
-        self._has_knees = torque is not None or equations.has_slack_tendons
+        self._has_knees = torque is not None or equations.has_slack_tendons or equations.friction is not None
         self.forget()
 
     def kicked(self, state: State, change: FloatArray) -> State:
@@ -141,7 +147,7 @@ class MidpointRule:
         rates[fixed] += change[fixed]
         if len(free):
             rates[free] -= np.linalg.solve(mass[self._block], mass[np.ix_(free, fixed)] @ change[fixed])
-        return State(state.time, state.x, rates)
+        return state._replace(rates=rates)
 
     def forget(self) -> None:
         """Forget the last accelerations, which predict the next: the load jumps."""
@@ -160,26 +166,33 @@ class MidpointRule:
         torque = self.torque
         if torque is not None:
             torque.begin(start.time, start.x, start.rates)
+        equations.begin_step(start.memory, start.x, start.rates, h)
         a, size = self._predicted(middle_time, len(y0)), max(1.0, math.sqrt(y0.dot(y0)))
 
         def move_middle(a: FloatArray) -> None:
             """Set the free coordinates of the middle state, which has these accelerations, shape (n_free,)."""
             x[free], rates[free], accelerations[free] = y0 + 0.5 * h * v0 + 0.25 * h * h * a, v0 + 0.5 * h * a, a
 
-        solve, last, shrinking = None, np.inf, 0.0
-        for iteration in range(1, ITERATIONS + 1):
+        solve, last, shrinking, line = None, np.inf, 0.0, None
+        searched = equations.friction is not None and not (torque is not None and torque.has_friction)
+        for iteration in range(1, (ITERATIONS if equations.friction is None else RUBBING_ITERATIONS) + 1):
             move_middle(a)
             forces = equations.balance(x, rates, accelerations, wrenches)
-            residual = forces[free]
-            if torque is not None:
-                residual[: torque.count] -= torque.exerted(middle_time, x, rates)
+            residual = self._unbalanced(forces, middle_time, x, rates)
             if not math.isfinite(residual.dot(residual)):
                 return None
+            if line is not None and (nearer := line.nearer(residual)) is not None:
+                a = nearer
+                continue
+            if equations.grip(x, forces):
+                forces = equations.balance(x, rates, accelerations, wrenches)
+                residual = self._unbalanced(forces, middle_time, x, rates)
             if solve is None or iteration == RENEWED or (self._has_knees and shrinking > SLOW):
                 solve = self._factorised(middle_time, x, rates, wrenches, h)
             change = solve(residual)
             if torque is not None and torque.has_friction:
                 change = torque.with_friction(solve, change, (v0 + h * a)[: torque.count], h)
+            line = LineSearch(a, change, residual) if searched else None
             a = a - change
             moved = 0.25 * h * h * math.sqrt(change.dot(change)) / size
             if moved <= CHANGE or (moved >= 0.5 * last and last <= ROUNDED):
@@ -195,11 +208,19 @@ class MidpointRule:
         ends[free], end_rates[free] = y0 + h * v0 + 0.5 * h * h * a, v0 + h * a
         self._past = [*self._past[-1:], (middle_time, a)]
         self._known = end_time, after
-        middle_state, lost = State(middle_time, x, rates), 0.0
+        middle_state = State(middle_time, x, rates)
+        memory, lost = equations.end_step(x, rates, ends)
         if torque is not None:
-            forces[: torque.count] = torque.exerted(*middle_state)
-            lost = float(torque.resistance @ rates[: torque.count])
-        return Step(start, State(end_time, ends, end_rates), middle_state, accelerations, forces[:m], wrenches, lost)
+            forces[: torque.count] = torque.exerted(middle_time, x, rates)
+            lost += float(torque.resistance @ rates[: torque.count])
+        return Step(start, State(end_time, ends, end_rates, memory), middle_state, accelerations, forces[:m], wrenches, lost)
+
+    def _unbalanced(self, forces: FloatArray, time: float, x: FloatArray, rates: FloatArray) -> FloatArray:
+        """What acts on the free coordinates less what has to, shape (n_free,)."""
+        residual = forces[self._at]
+        if self.torque is not None:
+            residual[: self.torque.count] -= self.torque.exerted(time, x, rates)
+        return residual
 
     def _path(self, time: float) -> FloatArray:
         """Actuators at a time, which may be the end of the last step."""

@@ -27,7 +27,7 @@ class MotionEnergy(Summarised):
     potential: FloatArray
     """Potential energy of the weight."""
     dissipated: FloatArray
-    """What dampers have taken."""
+    """What dampers and dry friction have taken."""
     load_work: FloatArray
     """Work of forces and wrenches."""
     motor_work: FloatArray
@@ -46,7 +46,7 @@ class MotionState(Summarised):
     """State of a robot in motion, from which `simulate` can start."""
 
     model: SoftModel
-    """The robot."""
+    """The robot, with what its dry friction remembers."""
     time: float
     """Time in the motion that it is taken from [s]."""
     q_motors: FloatArray

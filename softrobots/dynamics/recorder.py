@@ -10,6 +10,7 @@ from softrobots.core.checks import FloatArray, read_only
 from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import MidpointRule, State, Step
 from softrobots.dynamics.motion import Motion, MotionEnergy
+from softrobots.model.friction_coordinates import remembering
 from softrobots.statics.kinematics import frame_placement
 
 
@@ -29,6 +30,7 @@ class Recorder:
         self.rows = 0
         """Number of rows so far."""
         self._most_rows = 0
+        self._memory = start.memory
         self.times, self.tips = [start.time], [self.tip(start.x)]
         """Times of the steps, and positions of the tip then, shape (3,) [m]."""
         self._middles: list[float] = []
@@ -65,6 +67,8 @@ class Recorder:
             self._x[row], self._rates[row] = x, rates
             if self.rule.torque is not None:
                 self._motor_torques[row] = self.rule.torque.exerted(time, x, rates)
+        if last > self.rows:
+            self._memory = step.end.memory
         self._middles.append(middle.time)  # all is known; where Ctrl-C comes now, what is longer than `times` does not count
         self._exerted.append(step.actuator_forces)
         self._works.append((dissipated, load_work, motor_work))
@@ -110,7 +114,7 @@ class Recorder:
         exchanged = np.column_stack([np.interp(times, self.times, work) for work in works.T])
         columns = [read_only(np.ascontiguousarray(column)) for column in np.concatenate([stored, exchanged], axis=1).T]
         return Motion(
-            model=equations.model,
+            model=equations.model if self._memory is None else remembering(equations.model, self._memory),
             time=read_only(np.array(times)),
             q_motors=read_only(np.array(x[:, :m])),
             motor_velocities=read_only(np.array(rates[:, :m])),

@@ -18,6 +18,7 @@ from softrobots.core.result_file import KINDS, Kind, named_columns, vector_colum
 from softrobots.dynamics.motion import Motion, MotionEnergy
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.model.actuators import load_units
+from softrobots.model.friction_coordinates import packed_memories, with_memories
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.loads import Load
 from softrobots.statics.saved_results import pack_model, unpack_model
@@ -37,7 +38,7 @@ def _columns(model: SoftModel) -> dict[str, int]:
 def _pack(motion: Motion) -> dict[str, Any]:
     arrays = {name: getattr(motion, name) for name in ("time", *_columns(motion.model), "steps", *_NUMBERS, "interrupted")}
     energies = {one.name: getattr(motion.energy, one.name) for one in fields_of(MotionEnergy)}
-    return pack_model(motion.model, Load({}, motion.gravity)) | arrays | energies
+    return pack_model(motion.model, Load({}, motion.gravity)) | arrays | energies | packed_memories([motion.model])
 
 
 def _unpack(fields: Mapping[str, Any]) -> Motion:
@@ -58,7 +59,7 @@ def _unpack(fields: Mapping[str, Any]) -> Motion:
     numbers: dict[str, Any] = {name: finite_number(name, fields[name]) if name in fields else None for name in _NUMBERS}
     steps = finite_array("steps", fields["steps"], (None,), "s")
     return Motion(
-        model=model,
+        model=with_memories(fields, model, 1)[0],
         time=read_only(increasing("time", time, "s")),
         **columns,
         **numbers,

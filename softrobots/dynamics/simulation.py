@@ -70,7 +70,7 @@ def simulate(
         q_motors: Actuators, shape (n_motors,) [rad, m or N]: constants; a `Trajectory`, whose waypoints a cubic spline connects
             from rest to rest; or a function of time.
         start: An `Equilibrium` (with another load than its own: released), a `Motion`, whose end is taken, or a `MotionState`;
-            by default relaxed springs at rest.
+            by default relaxed springs at rest. Dry friction remembers what it does there.
         force: Force on the tip, shape (3,) [N], world axes: constant, a table `(times (n,), values (n, 3))`, linear between its
             rows, or a function of time. Functions are looked at a thousand times: pulses shorter than that are to be tables.
         wrench: Wrench at the tip, shape (6,) [N, N m], force first, or `{frame: (6,)}`; constant, tables or functions of time.
@@ -84,7 +84,7 @@ def simulate(
             the run is repeated with every step halved until the difference says that it is met, see `Motion.tip_error`.
         order: Order of the error in the length of the steps: 2 is the implicit midpoint rule (`softrobots.dynamics.midpoint`),
             4 the method of Gauss with two stages (`softrobots.dynamics.gauss`), for motors and loads that stand still. None: 2
-            with a given `time_step`, where motors or loads move, and where springs have plateaus, else 4.
+            with a given `time_step`, where motors or loads move, where springs have plateaus and with dry friction, else 4.
         motors: "prescribed": they move as `q_motors` says; "torque": motor joints move by `torque`, from where `start` has
             them, or else from where `q_motors` begins; it may be None after a start. Muscles follow `q_motors`.
         torque: Controller for motors="torque": a function of time, and positions and velocities of the motor joints, each shape

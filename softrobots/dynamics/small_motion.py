@@ -21,6 +21,7 @@ from softrobots.core.checks import FloatArray, one_each
 from softrobots.core.errors import DescriptionError, NeutralEquilibrium, ParameterError
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.held import held_stiffness
@@ -69,6 +70,7 @@ def small_motion(
         ParameterError: If a number is negative or not finite, a shape differs, or a contact slips.
         DescriptionError: If the robot has more joints than Pinocchio supports.
     """
+    check_frictionless(model, "small vibrations, in which what sticks would be stuck")
     m, placed, drives = model.n_motors, model.actuators.n_placed, model.actuators.drives
     if rotor_inertia is not None:
         given = one_each("rotor_inertia", rotor_inertia, placed, "kg m^2 or kg")

@@ -11,6 +11,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.dynamics.midpoint import State
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.time_inputs import MotorPath
+from softrobots.model.friction_coordinates import after_step, memory_of, untouched
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import check_no_contact
@@ -25,6 +26,7 @@ def first_state(model: SoftModel, start: Any, path: MotorPath, free: int = 0) ->
         ParameterError: If `start` is of another kind or robot, has obstacles, or has the actuators elsewhere.
     """
     motors, springs, rates = path(0.0), model.rest, np.zeros(model.n_motors + model.n_springs)
+    before = untouched(model)
     if start is not None:
         if isinstance(start, Motion):
             start = start.end
@@ -38,11 +40,13 @@ def first_state(model: SoftModel, start: Any, path: MotorPath, free: int = 0) ->
         if apart > _APART:
             text = f"at {start.q_motors.tolist()} at t = 0, where `start` has the actuators (it is {apart:.3g} rad or m away)"
             raise ParameterError("q_motors", motors, text)
+        before = start.model if isinstance(start, MotionState) else after_step(start.model, start.q_motors, start.q_springs)
         springs, motors = start.q_springs, np.concatenate([start.q_motors[:free], motors[free:]])
         if isinstance(start, MotionState):
             rates[: model.n_motors] = start.motor_velocities
             rates[model.n_motors :] = start.velocities
-    return State(0.0, np.concatenate([motors, springs]), rates)
+    memory = None if model.structure.friction is None else memory_of(before)
+    return State(0.0, np.concatenate([motors, springs]), rates, memory)
 
 
 def first_kick(path: MotorPath, rates: FloatArray) -> FloatArray | None:

@@ -115,13 +115,15 @@ def order_of_steps(order: Any, time_step: float | None, model: SoftModel, still:
         still: Whether motors and loads stand still.
 
     Raises:
-        ParameterError: If it is neither, or 4 where motors or loads move.
+        ParameterError: If it is neither, or 4 where motors or loads move, or of a robot with dry friction.
     """
     if order is None:
-        smooth = still and len(model.springs.beyond_plateaus(model.rest)) == 0
+        smooth = still and model.structure.friction is None and len(model.springs.beyond_plateaus(model.rest)) == 0
         return GaussRule.order if smooth and time_step is None else MidpointRule.order
     if order not in (GaussRule.order, MidpointRule.order) or isinstance(order, bool):
         raise ParameterError("order", order, "2, 4 or None")
+    if order == GaussRule.order and model.structure.friction is not None:
+        raise ParameterError("order", order, "2 or None of a robot with dry friction")
     if order == GaussRule.order and not still:
         raise ParameterError("order", order, "2 or None where motors or loads change over time")
     return int(order)

@@ -92,15 +92,16 @@ class DryFriction:
         pieces = self._paths.at(self._relaxed).pieces if self.guided else np.zeros(0)
         return FrictionMemory(self._relaxed[self.places], np.zeros(self.n_guides), pieces)
 
-    def after(self, strains: FloatArray, memory: FrictionMemory) -> FrictionMemory:
-        """Return the memory after a step to strains, shape (count,)."""
+    def after(self, strains: FloatArray, memory: FrictionMemory, place: FloatArray | None = None) -> FrictionMemory:
+        """Return the memory after a step to strains, shape (count,); if they are `place` in truth, the sliders move along."""
+        place = strains if place is None else place
         apart = strains[self.places] - memory.bending
         share = np.minimum(1.0, BENDING_STICK / np.maximum(np.linalg.norm(apart, axis=1), BENDING_STICK))
-        bending = strains[self.places] - apart * share[:, None]
+        bending = place[self.places] - apart * share[:, None]
         if not self.guided:
             return FrictionMemory(bending, memory.slip, memory.pieces)
-        pieces = self._paths.at(strains).pieces
-        slip = np.clip(self._slipped(pieces, memory), -self._stick, self._stick)
+        slip = np.clip(self._slipped(self._paths.at(strains).pieces, memory), -self._stick, self._stick)
+        pieces = self._paths.at(place).pieces
         return FrictionMemory(read_only(bending), read_only(slip), read_only(pieces))
 
     def grip(self, strains: FloatArray, tensions: FloatArray, memory: FrictionMemory) -> FloatArray:
@@ -139,6 +140,21 @@ class DryFriction:
             torque += pull @ arms
             stiffness += paths.stiffening(pull) + slips.T @ (sticking[:, None] * slips)
         return energy, torque, stiffness
+
+    def parts(self, strains: FloatArray, memory: FrictionMemory, grip: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return the friction of each part over its limit, and the torque on the strains at the limit.
+
+        Parts are both ways of bending of the sections, then guides. Shapes (2 n_sections + n_guides,) and (same, count).
+        """
+        apart = strains[self.places] - memory.bending
+        shares = (apart / np.maximum(np.linalg.norm(apart, axis=1), BENDING_STICK)[:, None]).ravel()
+        torques: FloatArray = np.repeat(self.limit, 2)[:, None] * np.eye(self._count)[self.places.ravel()]
+        if not self.guided:
+            return shares, torques
+        paths = self._paths.at(strains)
+        slips = np.clip(self._slipped(paths.pieces, memory) / self._stick, -1.0, 1.0)
+        pulls = -grip[:, None] * self._beyond @ paths.piece_arms
+        return np.concatenate([shares, slips]), np.concatenate([torques, pulls])
 
     def sticks(self, strains: FloatArray, memory: FrictionMemory) -> bool:
         """Return whether nothing slips at strains, shape (count,)."""

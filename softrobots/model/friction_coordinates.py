@@ -7,12 +7,13 @@ from __future__ import annotations
 
 import copy
 import math
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.model.coordinates import Coordinates, Point, ReducedLoad
 from softrobots.model.dry_friction import DryFriction, FrictionMemory
@@ -27,13 +28,16 @@ SAME_FRICTION = 1e-13
 
 _RUNAWAY = 1e6  # change that it does not come back from, likewise
 
+FrictionLaw = Callable[[FloatArray], tuple[float, FloatArray, FloatArray]]
+"""Energy [J], torque on the strains, shape (count,), and its derivative, of strains, shape (count,)."""
+
 
 class FrictionCoordinates:
     """Coordinates of a robot with dry friction: those of the robot without it, and the memory of the last state."""
 
     def __init__(self, inner: Coordinates, friction: DryFriction, memory: FrictionMemory, grip: FloatArray) -> None:
-        """Add friction to a robot without muscles."""
-        self._inner, self.friction = inner, friction
+        """Add friction to a robot without muscles, `inner`."""
+        self.inner, self.friction = inner, friction
         self.memory = memory
         """What friction remembers."""
         self.grip = grip
@@ -46,7 +50,19 @@ class FrictionCoordinates:
         energy, torque, stiffness = self.friction.at(elastic, self.memory, self.grip)
         if self.slides and self.friction.sticks(elastic, self.memory):
             stiffness = np.zeros_like(stiffness)
-        return FrictionPoint(self._inner.at(motors, elastic), energy, torque, stiffness, float(self.grip.sum()))
+        return FrictionPoint(self.inner.at(motors, elastic), energy, torque, stiffness, float(self.grip.sum()))
+
+
+class GivenFriction:
+    """Coordinates of a robot whose friction is given as a function of its strains."""
+
+    def __init__(self, inner: Coordinates, law: FrictionLaw) -> None:
+        """Add friction to a robot without muscles."""
+        self._inner, self._law = inner, law
+
+    def at(self, motors: FloatArray, elastic: FloatArray) -> FrictionPoint:
+        """Return the robot at given coordinates."""
+        return FrictionPoint(self._inner.at(motors, elastic), *self._law(elastic), 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,8 +126,8 @@ def check_frictionless(model: Any, what: str) -> SoftModel:
     """Return `model` if it is a `SoftModel` without dry friction, or raise ParameterError; `what` needs that, in words."""
     if check_model(model).structure.friction is not None:
         requirement = (
-            f"a robot without dry friction, for {what}; solve_equilibrium and follow_trajectory have it, "
-            "bending_friction and guide_friction of 0 leave it out"
+            f"a robot without dry friction, for {what}; solve_equilibrium, follow_trajectory, simulate and estimate_load "
+            "have it, bending_friction and guide_friction of 0 leave it out"
         )
         raise ParameterError("model", model.pinocchio.name, requirement)
     return model  # type: ignore[no-any-return]
@@ -139,7 +155,7 @@ def untouched(model: SoftModel) -> SoftModel:
 def remembering(model: SoftModel, memory: FrictionMemory, grip: FloatArray | None = None) -> SoftModel:
     """Return the robot with another memory, and the friction of each guide that slips, shape (n_guides,) [N]; none if None."""
     friction = _rubbing(model.coordinates).friction
-    return replace(model, coordinates=_rubbed(model.coordinates, memory, np.zeros(friction.n_guides) if grip is None else grip))
+    return _rubbed(model, memory, np.zeros(friction.n_guides) if grip is None else grip)
 
 
 def grip_of(model: SoftModel) -> FloatArray:
@@ -147,10 +163,22 @@ def grip_of(model: SoftModel) -> FloatArray:
     return _rubbing(model.coordinates).grip
 
 
+def friction_of(model: SoftModel, strains: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return friction at strains, shape (count,), in parts, see `DryFriction.parts`; only for a robot with friction."""
+    at = _rubbing(model.coordinates)
+    return at.friction.parts(strains, at.memory, at.grip)
+
+
 def slipping(model: SoftModel) -> SoftModel:
     """Return the robot with the derivatives of slip where nothing slips, by which a search leaves such a state."""
     last = _rubbing(model.coordinates)
-    return replace(model, coordinates=_rubbed(model.coordinates, last.memory, last.grip, slides=True))
+    return _rubbed(model, last.memory, last.grip, slides=True)
+
+
+def with_given_friction(model: SoftModel, law: FrictionLaw) -> SoftModel:
+    """Return the robot with its friction as a function of the strains, which remembers nothing; for a robot with friction."""
+    inner = _rubbing(model.coordinates).inner
+    return replace(model, coordinates=_around(model.coordinates, GivenFriction(inner, law)))
 
 
 def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: FloatArray) -> tuple[SoftModel, float]:
@@ -171,7 +199,27 @@ def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: Fl
     largest = float(np.abs(loads).max(initial=0.0))
     if not change <= _RUNAWAY * largest:
         return model, math.inf
-    return replace(model, coordinates=_rubbed(model.coordinates, last.memory, grip)), change / max(largest, 1e-300)
+    return _rubbed(model, last.memory, grip), change / max(largest, 1e-300)
+
+
+def packed_memories(models: Sequence[SoftModel]) -> dict[str, list[FloatArray]]:
+    """Return what dry friction remembers in each of some states of a robot, in named arrays; none without friction."""
+    if models[0].structure.friction is None:
+        return {}
+    memories = [memory_of(model)._asdict() for model in models]
+    return {f"friction_{name}": [memory[name] for memory in memories] for name in FrictionMemory._fields}
+
+
+def with_memories(fields: Mapping[str, Any], model: SoftModel, count: int) -> list[SoftModel]:
+    """Return a robot with each of a number of memories of dry friction, from the arrays of `packed_memories`."""
+    if model.structure.friction is None:
+        return [model] * count
+    shapes = [part.shape for part in memory_of(model)]
+    columns = [
+        finite_array(name, fields[name], (count, *shape))
+        for name, shape in zip((f"friction_{name}" for name in FrictionMemory._fields), shapes, strict=True)
+    ]
+    return [remembering(model, FrictionMemory(*parts)) for parts in zip(*columns, strict=True)]
 
 
 def _rubbing(coordinates: Any) -> FrictionCoordinates:
@@ -179,10 +227,17 @@ def _rubbing(coordinates: Any) -> FrictionCoordinates:
     return coordinates if isinstance(coordinates, FrictionCoordinates) else _rubbing(coordinates.inner)
 
 
-def _rubbed(coordinates: Any, memory: FrictionMemory, grip: FloatArray, slides: bool = False) -> Any:
+def _rubbed(model: SoftModel, memory: FrictionMemory, grip: FloatArray, slides: bool = False) -> SoftModel:
+    """The robot with other coordinates with friction."""
+    changed = copy.copy(_rubbing(model.coordinates))
+    changed.memory, changed.grip, changed.slides = memory, grip, slides
+    return replace(model, coordinates=_around(model.coordinates, changed))
+
+
+def _around(coordinates: Any, friction: Any) -> Any:
+    """Coordinates with others in place of those with friction, around which muscles wrap them."""
+    if isinstance(coordinates, FrictionCoordinates):
+        return friction
     changed = copy.copy(coordinates)
-    if isinstance(changed, FrictionCoordinates):
-        changed.memory, changed.grip, changed.slides = memory, grip, slides
-    else:
-        changed.inner = _rubbed(changed.inner, memory, grip, slides)
+    changed.inner = _around(changed.inner, friction)
     return changed

@@ -68,14 +68,10 @@ def solve_equilibrium(
         EquilibriumNotFound: If the residual stays above the tolerance; carries the best iterate.
     """
     choice("method", method, METHODS)
-    model = untouched(check_model(model))
-    motors = model.checked_motors(q_motors)
+    motors = check_model(model).checked_motors(q_motors)
     load = Load.of(model, force, wrench=wrench, frame=frame, gravity=gravity, environment=environment)
-    relaxed = model.rest
-    if previous is not None:
-        check_same_model(model, previous, "previous")
-        model, relaxed = after_step(previous.model, previous.q_motors, previous.q_springs), previous.q_springs
-    start = relaxed if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
+    model, before = from_before(model, previous)
+    start = before if q_springs0 is None else finite_array("q_springs0", q_springs0, (model.n_springs,), "rad")
     if q_springs0 is not None and not model.coordinates.at(motors, start).valid:
         raise ParameterError("q_springs0", start, "within the range of every section (see strain_chain.in_range)")
     positive_number("tolerance", tolerance)
@@ -95,6 +91,18 @@ def solve_equilibrium(
             iterations=iterations,
         )
     return result
+
+
+def from_before(model: SoftModel, previous: Equilibrium | None) -> tuple[SoftModel, FloatArray]:
+    """Return the robot with what dry friction remembers of the state before, and its springs there; None: of rest.
+
+    Raises:
+        ParameterError: If `previous` is no equilibrium of the robot.
+    """
+    if previous is None:
+        return untouched(model), model.rest
+    check_same_model(model, previous, "previous")
+    return after_step(previous.model, previous.q_motors, previous.q_springs), previous.q_springs
 
 
 def advice(best: Equilibrium, state: ElasticState) -> str:

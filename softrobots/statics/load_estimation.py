@@ -22,10 +22,11 @@ from softrobots.environment.environment import Environment
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import elastic_state
-from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state
+from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state, from_before
 from softrobots.statics.load_summary import load_parts
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_force.force_search import ANY
+from softrobots.statics.tip_force.friction_range import friction_range
 from softrobots.statics.tip_force.load_errors import MeasurementErrors
 from softrobots.statics.tip_force.measured_torques import SOLVERS, Explanation, MeasuredTorques
 
@@ -68,6 +69,9 @@ class LoadEstimate(Summarised):
     than three motors are fitted."""
     iterations: int
     """Steps of the solver."""
+    friction_range: FloatArray | None = None
+    """Least and largest value of each component of the force if nothing is known of dry friction but its limits, to first
+    order, shape (3, 2) [N]; None without friction. The force itself takes friction from the state before."""
     directions: FloatArray | None = None
     """Orthonormal directions that the force may have, shape (k, 3); None: any."""
     alternatives: tuple[LoadEstimate, ...] = ()
@@ -103,6 +107,7 @@ def estimate_load(
     frame: str | None = None,
     directions: Any = None,
     gravity: Any = None,
+    previous: Equilibrium | None = None,
     torque_std: Any = None,
     stiffness_std: Any = None,
     motor_angle_std: Any = None,
@@ -127,6 +132,11 @@ def estimate_load(
     not all: of 21 that thousands of starts find in 150 postures of the arm of the paper under 20 N it finds 17, and misses
     forces of 180 to 300 N; more than three motors leave one force.
 
+    With dry friction the force is the one under which the robot steps from `previous` to the measured torques, to the least
+    energy with what friction dissipates. What sticks may carry anything within its limits, which the motors hardly feel: then
+    the force is only as good as `previous`, and `friction_range` says how far it may be off whatever came before. Derivatives
+    (singular values, covariance) are those of small steps on from there, at constant friction of guides.
+
     Args:
         model: The robot, with at least one motor.
         q_motors: Motor coordinates, shape (n_motors,) [rad or m].
@@ -138,6 +148,7 @@ def estimate_load(
         directions: Directions that the force may have, shape (3,) or (k, 3), world axes, any length: the normal of a contact
             without friction. None: any. Not for "alternation".
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+        previous: Where the robot comes from: what dry friction remembers, and the start of the springs. None: from rest.
         torque_std: Standard deviation of the torque noise, one number or shape (n_motors,) [N m], for the covariance; five
             times it may then stay unexplained.
         stiffness_std: Standard deviation of the stiffness of the springs, as a share of it, one number or shape (n_springs,)
@@ -159,8 +170,9 @@ def estimate_load(
         LoadNotFound: If no force explains the torques; carries the best estimate.
         NeutralEquilibrium: If the search meets a load at which the tangent stiffness is singular.
     """
-    check_frictionless(model, "an estimate of its load")
-    choice("method", method, METHODS)
+    choice("method", method, METHODS if environment is None else METHODS[:1])
+    if method == "alternation":
+        check_frictionless(model, "an estimate by 'alternation' ('newton' takes it)")
     instance_of("restart", restart, bool, "True or False")
     check_feels(model)
     motors = model.checked_motors(q_motors)
@@ -170,11 +182,11 @@ def estimate_load(
     span = _span(directions)
     if method == "alternation" and directions is not None:
         raise ParameterError("directions", directions, "None for 'alternation', which finds forces of any direction")
-    choice("method", method, METHODS if environment is None else METHODS[:1])
     base = Load.of(model, frame=at, gravity=gravity, environment=environment)
     most = 100 if method == "newton" else 1000
     most = most if max_iterations is None else positive_integer("max_iterations", max_iterations)
-    problem = MeasuredTorques(model, motors, torques, base, at, errors, span)
+    model, start = from_before(model, previous)
+    problem = MeasuredTorques(model, motors, torques, base, at, errors, span, start)
     best, *others = SOLVERS[method](problem, most, restart=restart)
     result = _estimate(problem, best, method, others)
     if not (problem.explained(best) and result.equilibrium.converged):
@@ -225,6 +237,7 @@ def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others:
     singular_values[: len(values)] = values
     inverse = observable.T @ ((left[:, : len(values)].T[keep]) / values[keep][:, None])
     load = problem.load(force)
+    off = friction_range(state, problem.motors, load, problem.frame, problem.span)
     parts = {name: read_only(moved @ moved.T) for name, moved in ((name, inverse @ error) for name, error in errors.items())}
     unobservable = np.concatenate([right[: len(values)][~keep], right[len(values) :]])
     return LoadEstimate(
@@ -239,6 +252,7 @@ def _estimate(problem: MeasuredTorques, found: Explanation, method: str, others:
         covariance_parts=read_only_mapping(parts),
         residual=problem.residual(state),
         iterations=iterations,
+        friction_range=None if off is None else read_only(force[:, None] + off),
         directions=None if problem.span is ANY else problem.span,
         alternatives=tuple(_estimate(problem, other, method, []) for other in others),
         **problem.errors._asdict(),
@@ -274,7 +288,7 @@ def estimate_at(equilibrium: Equilibrium, fields: Mapping[str, Any]) -> LoadEsti
     base = equilibrium.load.plus(frame, np.concatenate([-force, np.zeros(3)]))
     errors = MeasurementErrors.of(model, *(fields.get(name) for name in MeasurementErrors._fields))
     span = _span(fields.get("directions"))
-    problem = MeasuredTorques(model, motors, torques, base, frame, errors, span)
+    problem = MeasuredTorques(model, motors, torques, base, frame, errors, span, equilibrium.q_springs)
     best, *rest = (
         problem.explanation(one, elastic_state(model, motors, springs, problem.load(one)), equilibrium.iterations)
         for one, springs in ((force, equilibrium.q_springs), *zip(others, other_springs, strict=True))

@@ -19,6 +19,9 @@ def load_parts(estimate: Any) -> list[Part]:
     if len(estimate.covariance_parts) > 1:
         for name, part in estimate.covariance_parts.items():
             rows.append((f"    by {name.replace('_', ' ')}", f"{formatted(np.sqrt(np.diag(part)))} N"))
+    if estimate.friction_range is not None:
+        low, high = estimate.friction_range.T
+        rows.append(("  friction unknown", f"{formatted(low)} to {formatted(high)} N"))
     rows += [("  explained as well by", f"{formatted(other.force)} N") for other in estimate.alternatives]
     motors = estimate.equilibrium.model.actuators.units
     felt = f"{formatted(estimate.singular_values)} {unit_per_newton(motors)}"

@@ -17,8 +17,7 @@ from softrobots.core.checks import FloatArray, choice, finite_array, finite_numb
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.json_text import parse_json
 from softrobots.core.result_file import KINDS, TABLES, Kind, counts, label, text
-from softrobots.model.dry_friction import FrictionMemory
-from softrobots.model.friction_coordinates import memory_of, remembering
+from softrobots.model.friction_coordinates import packed_memories, with_memories
 from softrobots.model.loader import load_again, load_arguments
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.buckling.equilibrium_branch import EquilibriumBranch
@@ -83,9 +82,7 @@ def _pack_rows(equilibria: tuple[Equilibrium, ...], *, one_load: bool = True) ->
     for equilibrium in equilibria:
         check_no_rubbing(equilibrium, "its file (a ContactPath is saved with its friction)")
     columns = {name: [getattr(equilibrium, name) for equilibrium in equilibria] for name in _COLUMNS}
-    if first.model.structure.friction is not None:
-        memories = [memory_of(equilibrium.model)._asdict() for equilibrium in equilibria]
-        columns |= {f"friction_{name}": [memory[name] for memory in memories] for name in FrictionMemory._fields}
+    columns |= packed_memories([equilibrium.model for equilibrium in equilibria])
     return pack_model(first.model, first.load) | columns | {"solver": [equilibrium.method for equilibrium in equilibria]}
 
 
@@ -101,15 +98,12 @@ def _unpack_rows(fields: Mapping[str, Any], forces: FloatArray | None = None, fr
     iterations, solvers = counts(fields, "iterations"), fields["solver"].tolist()
     for solver in set(solvers):
         choice("solver", solver, _SOLVERS)
-    memories = None if model.structure.friction is None else _memories(fields, model, count)
     equilibria = []
-    for row in range(count):
+    for row, robot in enumerate(with_memories(fields, model, count)):
         model.actuators.checked(motors[row])
-        if memories is not None:
-            model = remembering(model, memories[row])
         at = load if forces is None else load.plus(frame, np.append(forces[row], np.zeros(3)))
-        state = elastic_state(model, motors[row], springs[row], at)
-        found = equilibrium_from_state(model, motors[row], at, state, method=solvers[row], iterations=iterations[row])
+        state = elastic_state(robot, motors[row], springs[row], at)
+        found = equilibrium_from_state(robot, motors[row], at, state, method=solvers[row], iterations=iterations[row])
         # Rounding differs between machines; a coordinate shifted by 1e-9 rad exceeds this.
         if found.residual > 1.001 * residual[row] + largest_residual(model, state.scale, 1e-12):
             raise FileFormatError(
@@ -120,16 +114,6 @@ def _unpack_rows(fields: Mapping[str, Any], forces: FloatArray | None = None, fr
             raise FileFormatError(f"its row {row} is {-deepest:.3g} m inside of an obstacle")
         equilibria.append(replace(found, tolerance=float(tolerance[row])))
     return tuple(equilibria)
-
-
-def _memories(fields: Mapping[str, Any], model: SoftModel, count: int) -> list[FrictionMemory]:
-    """What dry friction remembered before each row."""
-    shapes = [part.shape for part in memory_of(model)]
-    columns = [
-        finite_array(name, fields[name], (count, *shape))
-        for name, shape in zip((f"friction_{name}" for name in FrictionMemory._fields), shapes, strict=True)
-    ]
-    return [FrictionMemory(*parts) for parts in zip(*columns, strict=True)]
 
 
 def _pack_solution(solution: IkSolution) -> dict[str, Any]:

@@ -18,8 +18,9 @@ from softrobots.core.checks import FloatArray, finite_array, one_each, positive_
 from softrobots.core.errors import LoadNotFound, NeutralEquilibrium, ParameterError
 from softrobots.core.summary import Summarised
 from softrobots.environment.capsules import capsule_tags
+from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.loader import with_points
-from softrobots.model.soft_model import SoftModel, check_model
+from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.load_estimation import LoadEstimate, estimate_load
 
@@ -77,7 +78,7 @@ def locate_contact(
         NameNotFound: If a link does not exist.
         DescriptionError: If the robot has no capsules, and no candidates are given.
     """
-    if check_model(model).n_motors < 2:
+    if check_frictionless(model, "places of contacts").n_motors < 2:
         raise ParameterError("model", model, "a robot with at least two motors")
     noise = one_each("torque_std", torque_std, model.n_motors, "N m", positive=True)
     rows = _on_body(model, positive_integer("count", count, 1000)) if places is None else _given(places)

@@ -65,6 +65,8 @@ class MeasuredTorques:
     """Errors of measurement."""
     span: FloatArray
     """Orthonormal directions that the force may have, shape (k, 3)."""
+    start: FloatArray
+    """Springs where the search begins, shape (n_springs,)."""
 
     @cached_property
     def tolerance(self) -> float:
@@ -148,8 +150,8 @@ def newton(problem: MeasuredTorques, most: int, *, restart: bool) -> list[Explan
     """
     model = problem.model
     no_force = np.zeros(3)
-    relaxed = elastic_state(model, problem.motors, model.rest, problem.load(no_force))
-    start = problem.equilibrium(no_force, relaxed) or relaxed
+    before = elastic_state(model, problem.motors, problem.start, problem.load(no_force))
+    start = problem.equilibrium(no_force, before) or before
     best = _without_hidden(problem, _search(problem, no_force, start, most), most)
     if not restart:
         return [best]
