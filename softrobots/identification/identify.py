@@ -104,6 +104,8 @@ def identify(
     if isinstance(others, Measurements):
         others = others.in_order_of(chosen.present)
         others.check(chosen.present)
+    import scipy.optimize  # noqa: F401  # before the limit, which counts for what is loaded; importing it takes a while
+
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
     with one_blas_thread(1000):

@@ -69,7 +69,13 @@ def model_change(parameters: ParameterSet, values: Any = None, *, fourth_order: 
         ParameterError: If the structure of the robot changes with a parameter about its value: a route that begins to wind, or
             friction that begins.
     """
-    at = np.array(parameters.values if values is None else values, dtype=np.float64)
+    at = parameters.values if values is None else np.asarray(values, dtype=np.float64)
+    return _change(parameters, tuple(at.tolist()), fourth_order)
+
+
+@lru_cache(maxsize=4)
+def _change(parameters: ParameterSet, values: tuple[float, ...], fourth_order: bool) -> ModelChange:
+    at = np.array(values)
     base, columns = numbers_of(parameters.model(at)), dict[str, FloatArray]()
     for place in np.flatnonzero(parameters.of_model).tolist():
 
