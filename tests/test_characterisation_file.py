@@ -76,6 +76,7 @@ def test_points_are_those_of_the_file_in_any_unit(data: st.DataObject, tmp_path_
         ("angle [deg],moment [N m]\n1,2\n2,4\n", "has 2 rows of numbers; at least 3 are required"),
         ("angle [deg],moment [N m]\n1,2\n\n2,x\n3,6\n", "line 4: moment [N m] = 'x'; a finite number is required"),
         ("angle [deg],moment [N m]\n1,2\n2,4,\n3,6\n", "line 3: 3 cells; 2 are required"),
+        ("angle [deg];moment [N m]\n1,5;2\n", "line 1: its cells are parted by semicolons"),
         ("angle [rad],moment [N m]\n1,2\n\n-7.2,4\n3,6\n", "line 4: the link is bent by -7.2 rad; less than a right angle"),
         ("displacement [m],force [N]\n0.1,2\n1e31,4\n0.3,6\n", "line 3: displacement [m] must be at most 1e+30 in size"),
     ],

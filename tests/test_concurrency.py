@@ -217,6 +217,7 @@ def test_blas_is_free_again_after_the_last_user(monkeypatch: pytest.MonkeyPatch)
             return Limiter()
 
     monkeypatch.setattr(blas_threads._Limit, "controller", Controller())
+    monkeypatch.setattr(blas_threads._Limit, "scipy", "scipy.linalg" in sys.modules)
     first, second = one_blas_thread(100), one_blas_thread(100)
     first.__enter__()
     second.__enter__()

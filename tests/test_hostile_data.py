@@ -179,8 +179,11 @@ def test_a_pipe_that_somebody_writes_to_is_read(tmp_path: Path) -> None:
         (PATH + "2,1_0,2,3\n", r"line 4: x = '1_0'; a finite number"),  # Python's own float() takes it for ten
         (PATH + "2,\u0661,2,3\n", "line 4: x"),  # and this for one
         (PATH + "2,1,2,3,\n", "line 4: 5 cells; 4 are required"),
-        (PATH + "2,1,5,2,3\n", "line 4: 5 cells; 4 are required"),  # a decimal comma
-        ("t;x;y;z\n0;1;2;3\n1;1;2;3\n", "it names t;x;y;z; x, y, z are required"),
+        (PATH + "2,1,5,2,3\n", r"line 4: 5 cells; 4 are required \(a decimal comma makes two"),
+        ("t;x;y;z\n0;1;2;3\n1;1;2;3\n", "line 1: its cells are parted by semicolons; commas are required, and points"),
+        ('"t"\t"x"\t"y"\t"z"\n0\t1\t2\t3\n', "line 1: its cells are parted by tabs; commas are required"),
+        (PATH + '2,"1,5",2,3\n', "line 4: x = '1,5'; a finite number is required with a point, not a comma"),
+        (PATH + '2,"1,5,5",2,3\n', "line 4: x = '1,5,5'; a finite number is required"),
         ("t,t,x,y,z\n0,0,1,2,3\n1,1,1,2,3\n", "at most once"),
         (PATH + "2," + "9" * 400 + ",2,3\n", "a finite number is required"),
         (PATH + "2,1e31,2,3\n", "at most 1e"),

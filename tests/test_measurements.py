@@ -213,6 +213,7 @@ BAD_FILES = [
     (FILE.replace("6,b", "6,"), r"data\.csv: labels \(line 5\) = ''.*a word of 1 to 200"),
     (FILE.replace("hung", "hang"), r"data\.csv, line 1: it names q1, q2, q3, hang.*each once"),
     ("# nothing\n\n" + FILE.replace("x", "q1"), r"data\.csv, line 3: it names"),
+    (FILE.replace(",", ";"), r"data\.csv, line 1: its cells are parted by semicolons; commas are required"),
     ("q1,q2,q3,hung,x,y,z,set\n", "has no rows of numbers"),
     ("", "it names nothing"),
     ("q1,q2,q3,hung,x,y,z,set\n1,2,3,4,,,,a\n", "at least one number of positions"),

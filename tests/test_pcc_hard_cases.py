@@ -166,9 +166,15 @@ def test_one_blas_thread_is_given_back() -> None:
     from softrobots.core.blas_threads import one_blas_thread
 
     def counts() -> list[int]:
-        """Threads of NumPy's BLAS; another one, of SciPy, may have been loaded later."""
-        libraries = [info for info in threadpoolctl.threadpool_info() if info["user_api"] == "blas"]
-        return [info["num_threads"] for info in libraries if "numpy" in info["filepath"]]
+        """Threads of NumPy's BLAS and of SciPy's."""
+        paths = {
+            info["filepath"]: info["num_threads"] for info in threadpoolctl.threadpool_info() if info["user_api"] == "blas"
+        }
+        return [paths[path] for path in sorted(paths) if "numpy" in path or "scipy" in path]
+
+    with one_blas_thread(500):
+        pass
+    import scipy.linalg  # noqa: F401  # loaded after the first limit, it is limited, too
 
     before = counts()
     assert before

@@ -7,6 +7,7 @@ rounds differently then, so that results would depend on the number of cores and
 
 from __future__ import annotations
 
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext
@@ -20,6 +21,7 @@ class _Limit:
     """The limit of the process, shared by all threads that solve: set by the first, lifted by the last."""
 
     users = 0
+    scipy: bool | None = None
     controller: Any = None
     limiter: Any = None
 
@@ -37,10 +39,11 @@ def one_blas_thread(rows: int) -> AbstractContextManager[None]:
 def _limited() -> Iterator[None]:
     with _LOCK:
         if _Limit.users == 0:
-            if _Limit.controller is None:
+            scipy = "scipy.linalg" in sys.modules  # which brings a BLAS of its own
+            if _Limit.scipy is not scipy:
                 from threadpoolctl import ThreadpoolController
 
-                _Limit.controller = ThreadpoolController()
+                _Limit.controller, _Limit.scipy = ThreadpoolController(), scipy
             _Limit.limiter = _Limit.controller.limit(limits=1, user_api="blas")
         _Limit.users += 1
     try:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import io
 import math
+import re
 import sys
 from array import array
 from collections.abc import Container, Iterator, Sequence
@@ -24,6 +25,8 @@ MOST_ROWS = 1_000_000
 """Maximum number of rows of numbers."""
 
 _LONGEST_LINE = 1_000_000  # characters
+_OTHER_SIGNS = {";": "semicolons", "\t": "tabs"}
+_DECIMAL_COMMA = re.compile(r"[-+]?\d+,\d+([eE][-+]?\d+)?")
 
 
 class Table(NamedTuple):
@@ -65,8 +68,8 @@ def read_table(
         The columns present, those of `optional` first.
 
     Raises:
-        FileFormatError: If the file cannot be read or is too large, lacks a column or has it twice, or (naming the line) has a
-            cell that is not a finite number, or more or fewer cells than the first line.
+        FileFormatError: If the file cannot be read or is too large, has other signs than commas between cells, lacks a column
+            or has it twice, or (naming the line) has a cell that is not a finite number, or more or fewer cells than the first.
     """
     numbers, lines = array("d"), array("q")
     with opened(path) as file, io.TextIOWrapper(file, encoding="utf-8-sig", newline="") as text:
@@ -82,7 +85,8 @@ def read_table(
                     continue
                 where = f"{path}, line {reader.line_num}"
                 if len(cells) != len(names):
-                    raise FileFormatError(f"{where}: {len(cells)} cells; {len(names)} are required")
+                    commas = " (a decimal comma makes two of one number)" if len(cells) > len(names) else ""
+                    raise FileFormatError(f"{where}: {len(cells)} cells; {len(names)} are required{commas}")
                 if len(lines) == MOST_ROWS:
                     raise FileFormatError(f"{where}: more than {MOST_ROWS} rows; at most {MOST_ROWS} are read")
                 numbers.extend(_number(f"{where}: {names[place]}", cells[place], gap) for place, gap in places)
@@ -111,6 +115,10 @@ def _lines(path: Path, file: io.TextIOWrapper, comments: bool) -> Iterator[str]:
 
 def _columns(where: str, names: Sequence[str], required: Sequence[str], optional: Sequence[str]) -> tuple[str, ...]:
     """Names of the columns present, checked to occur as often as they must."""
+    for sign, word in _OTHER_SIGNS.items():
+        parted = {name.strip(' "') for name in ",".join(names).split(sign)}
+        if any(name in parted and name not in names for name in (*required, *optional)):
+            raise FileFormatError(f"{where}: its cells are parted by {word}; commas are required, and points in numbers")
     if any(names.count(name) != 1 for name in required) or any(names.count(name) > 1 for name in optional):
         named = ", ".join(names[:20]) + (", ..." if len(names) > 20 else "")
         allowed = [f"{', '.join(required)} are required, each once"] if required else []
@@ -131,5 +139,6 @@ def _number(what: str, cell: str, gap: bool) -> float:
         value = math.nan
     if not math.isfinite(value):
         start = cell if len(cell) <= 60 else f"{cell[:57]}..."
-        raise FileFormatError(f"{what} = {start!r}; a finite number is required")
+        comma = " with a point, not a comma" if _DECIMAL_COMMA.fullmatch(cell.strip()) else ""
+        raise FileFormatError(f"{what} = {start!r}; a finite number is required{comma}")
     return value

@@ -236,7 +236,7 @@ class Fit:
     def _run_off(self, x: FloatArray) -> FloatArray:
         """Combinations that noise hides along which a search has gone far, in rows of norm 1, shape (k, P)."""
         stacked = np.vstack([self._slopes(x), np.diag(np.sqrt(self._information(x)))])
-        _, singular, right = np.linalg.svd(stacked * self._logarithmic)
+        _, singular, right = np.linalg.svd(stacked * self._logarithmic, full_matrices=False)
         hidden = right[singular < np.sqrt(self._variance(x))]
         return np.asarray(hidden[np.abs(hidden @ ((x - self._anchor) * self._logarithmic)) > _RUN_OFF])
 

@@ -41,7 +41,7 @@ _SPREAD = 0.3  # of random starts, relative; for angles and rotations in rad, fo
 def identify(
     robot: Any,
     measurements: Measurements,
-    parameters: str | Sequence[str],
+    parameters: str | Sequence[str] | ParameterSet,
     *,
     loss: str = "linear",
     priors: Mapping[str, tuple[Any, Any]] | None = None,
@@ -59,7 +59,7 @@ def identify(
     Args:
         robot: A dataclass of parameters with the values to start from, or a `SoftModel`.
         measurements: What was measured; rows that its mask leaves out do not count.
-        parameters: Names of what is unknown, see `softrobots.identification.parameters`.
+        parameters: Names of what is unknown, see `softrobots.identification.parameters`, or a set of them of the robot.
         loss: "linear", or one in which outliers count less, from residuals of one standard deviation on: "soft_l1", "huber",
             "cauchy", "arctan".
         priors: `{name: (mean, standard deviation)}` in the unit of the parameter; for a name of several components numbers for
@@ -90,7 +90,8 @@ def identify(
         if key.partition(".")[0] not in QUANTITIES:
             raise ParameterError("measurements", key, f"of quantities that are fitted: {', '.join(QUANTITIES)}")
     most, count = positive_integer("max_iterations", max_iterations), positive_integer("starts", starts)
-    chosen = ParameterSet.of(robot, parameters, measurements.markers)
+    known = isinstance(parameters, ParameterSet)
+    chosen: Any = parameters if known else ParameterSet.of(robot, parameters, measurements.markers)  # type: ignore[arg-type]
     loads = [one.name for one in chosen.parameters if one.place.kind in ("motor", "force", "wrench", "gravity")]
     if loads:
         raise ParameterError("parameters", loads[0], "no load or actuator coordinate: measurements give those")
@@ -104,6 +105,8 @@ def identify(
     if isinstance(others, Measurements):
         others = others.in_order_of(chosen.present)
         others.check(chosen.present)
+    import scipy.optimize  # noqa: F401  # before the limit, which counts for what is loaded; importing it takes a while
+
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
     with one_blas_thread(1000):

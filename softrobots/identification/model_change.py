@@ -1,8 +1,9 @@
 r"""How the numbers of a model change with parameters, by differences of models loaded with other values.
 
 Central differences at :math:`p \pm h`, with `h` of 1e-5 of the scale of the parameter, are exact to 1e-10, of fourth order to
-1e-12; at a bound they are one-sided, of second order. All that follows from the numbers is in closed form. A change may serve
-many states of a model, and those of models nearby while a fit is on its way.
+1e-12, which a sensitivity needs where effects cancel: a thicker wall makes a tube heavier and stiffer by nearly the same share.
+At a bound they are one-sided, of second order. All that follows from the numbers is in closed form. A change may serve many
+states of a model, and those of models nearby while a fit is on its way.
 """
 
 from __future__ import annotations
@@ -69,7 +70,13 @@ def model_change(parameters: ParameterSet, values: Any = None, *, fourth_order: 
         ParameterError: If the structure of the robot changes with a parameter about its value: a route that begins to wind, or
             friction that begins.
     """
-    at = np.array(parameters.values if values is None else values, dtype=np.float64)
+    at = parameters.values if values is None else np.asarray(values, dtype=np.float64)
+    return _change(parameters, tuple(at.tolist()), fourth_order)
+
+
+@lru_cache(maxsize=4)
+def _change(parameters: ParameterSet, values: tuple[float, ...], fourth_order: bool) -> ModelChange:
+    at = np.array(values)
     base, columns = numbers_of(parameters.model(at)), dict[str, FloatArray]()
     for place in np.flatnonzero(parameters.of_model).tolist():
 
@@ -97,7 +104,7 @@ def present_change(parameters: ParameterSet) -> ModelChange:
     if any(not np.allclose(present[name], loaded[name], rtol=1e-9, atol=1e-12) for name in present):
         requirement = "names of numbers with the values that the robot has: one name of several parts ties them to one value"
         raise ParameterError("parameters", parameters.names, requirement)
-    return model_change(parameters)
+    return model_change(parameters, fourth_order=True)
 
 
 def differences(
@@ -117,7 +124,7 @@ def differences(
     """
     refusal = ""
     scale = abs(value) if parameter.logarithmic else max(abs(value), _TYPICAL.get(parameter.unit, 1.0))
-    for step, weights in (_FOURTH_ORDER if fourth_order else _CENTRAL, _UPWARDS, _DOWNWARDS):
+    for step, weights in (*([_FOURTH_ORDER] if fourth_order else []), _CENTRAL, _UPWARDS, _DOWNWARDS):
         tried = {number: value + number * step * scale for number in weights}
         if not parameter.lower <= min(tried.values()) <= max(tried.values()) <= parameter.upper:
             continue

@@ -21,9 +21,9 @@ from __future__ import annotations
 
 import dataclasses
 import warnings
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
 from typing import Any
 
 import numpy as np
@@ -151,13 +151,22 @@ class ParameterSet:
             ParameterError: If the shape differs, or the robot refuses a value.
             DescriptionError: If the robot with these values cannot be described, e.g. with parts too light.
         """
+        numbers = finite_array("values", values, (len(self.parameters),))
+        return self._models(tuple(np.where(self.of_model, numbers, 0.0).tolist()))
+
+    @cached_property
+    def _models(self) -> Callable[[tuple[float, ...]], SoftModel]:
+        """The last models, which stay the same while only the base, markers or offsets change."""
+        return lru_cache(maxsize=4)(self._model)
+
+    def _model(self, values: tuple[float, ...]) -> SoftModel:
         robot = self.robot(values)
         model = self.present if robot is self.present.robot else load_model(robot, **self._load_arguments)
         springs = dict(model.spring_table)
         for number, one in self.places("spring"):
             for joint in one.place.names:
                 stiffness, rest = springs[joint]
-                springs[joint] = (stiffness, float(values[number])) if one.place.parts[0] else (float(values[number]), rest)
+                springs[joint] = (stiffness, values[number]) if one.place.parts[0] else (values[number], rest)
         return with_springs(model, springs) if self.places("spring") else model
 
     def base(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:

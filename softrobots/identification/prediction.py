@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Mapping
 from functools import cached_property
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
@@ -30,6 +30,7 @@ from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
+from softrobots.identification.row_equilibria import balanced_rows
 from softrobots.model.friction_coordinates import after_step, memory_of, untouched
 from softrobots.model.numbers import LAW
 from softrobots.model.soft_model import SoftModel
@@ -217,34 +218,36 @@ class Predictor:
         measurements, (_, turn) = self.measurements, self.parameters.base(values)
         motors = measurements.motor_coordinates(model) + self.parameters.motor_offsets(values)
         loads = loads_on(model, measurements.loads, np.asarray(pin.exp3(turn)))
-        sliders: list[FloatArray] = []
-        states = list(self._equilibria(model, motors, loads, sliders))
-        lost = [measurements.where(row) for row, state in enumerate(states) if state is None]
+        starts = np.tile(model.rest, (len(motors), 1)) if self._springs is None else self._springs
+        states, found = balanced_rows(model, motors, loads, starts, _TOLERANCE)
+        sliders, lost = list[FloatArray](), list[str]()
+        for row, state in self._equilibria(model, motors, loads, np.flatnonzero(~found), sliders):
+            if state is None:
+                lost.append(measurements.where(row))
+                continue
+            states.q_springs[row], states.tangent[row] = state.q_springs, state.tangent
+            states.actuator_loads[row], states.coupling[row] = state.load.motors, state.load.coupling
         if lost:
-            words = ", ".join(lost[:10]) + (f" and {len(lost) - 10} more" if len(lost) > 10 else "")
-            requirement = f"rows with an equilibrium at the values to start from; {words} have none: start from others, or"
-            raise ParameterError("measurements", measurements, f"{requirement} leave them out by the mask")
-        found = [state for state in states if state is not None]
-        self._springs = np.array([state.q_springs for state in found])
-        of_actuators, coupling = ([getattr(state.load, name) for state in found] for name in ("motors", "coupling"))
-        tangent = [state.tangent for state in found]
-        at = States(motors, self._springs, loads, *(np.array(one) for one in (of_actuators, tangent, coupling)))
-        return at, np.array(sliders) if self.in_order else None
+            words = ", ".join(lost[:10]) + (f" and {len(lost) - 10} more" if len(lost) > 10 else "") + " have none"
+            requirement = f"rows with an equilibrium at the values to start from; {words}: start from others, or leave them out"
+            raise ParameterError("measurements", measurements, f"{requirement} by the mask")
+        self._springs = states.q_springs
+        return states, np.array(sliders) if self.in_order else None
 
     def _equilibria(
-        self, model: SoftModel, motors: FloatArray, loads: dict[str, FloatArray], sliders: list[FloatArray]
-    ) -> Iterable[ElasticState | None]:
-        """Search from the equilibria of the values before, then from rest or the row before; appends sliders of friction."""
-        now, before = untouched(model), np.asarray(model.rest)
-        for row, load in enumerate(self.cases(loads)):
+        self, model: SoftModel, motors: FloatArray, loads: dict[str, FloatArray], rows: Any, sliders: list[FloatArray]
+    ) -> Iterable[tuple[int, ElasticState | None]]:
+        """Search some rows from the equilibria of the values before, then from rest or the row before; appends sliders."""
+        now, before, cases = untouched(model), np.asarray(model.rest), self.cases(loads) if len(rows) else []
+        for row in rows.tolist():
             state = None
             if self.in_order:
                 sliders.append(memory_of(now).bending)
             for start in (self._springs[row], before) if self._springs is not None else (before,):
-                state = state or balanced_state(now, motors[row], load, start, tolerance=_TOLERANCE)
+                state = state or balanced_state(now, motors[row], cases[row], start, tolerance=_TOLERANCE)
             if state is not None and self.in_order:
                 now, before = after_step(now, motors[row], state.q_springs), state.q_springs
-            yield state
+            yield row, state
 
     def cases(self, loads: Mapping[str, FloatArray]) -> list[Load]:
         """Return the loads of the rows, made once while they stay the same."""
@@ -275,12 +278,10 @@ def _pose(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
 
 def _load(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
     """Loads on the actuators, of which the last are tensions."""
-    states, count = prediction.at.states, measured.shape[1]
-    values = states.actuator_loads[:, -count:]
-    weights = np.tile(np.eye(states.actuator_loads.shape[1])[-count:], (len(values), 1, 1))
-    return Seen(
-        values, difference(measured, values), lambda: -prediction.along(AdjointRows(prediction.at, Outputs(loads=weights)))
-    )
+    at, count = prediction.at, measured.shape[1]
+    values = at.states.actuator_loads[:, -count:]
+    weights = np.tile(np.eye(at.states.actuator_loads.shape[1])[-count:], (len(values), 1, 1))
+    return Seen(values, difference(measured, values), lambda: -prediction.along(AdjointRows(at, Outputs(loads=weights))))
 
 
 def _vibration(prediction: Prediction, key: str, measured: FloatArray) -> Seen:

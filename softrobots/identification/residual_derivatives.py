@@ -70,6 +70,11 @@ class EquilibriumDerivatives:
             tensions = states.actuator_loads[:, self.n_joint_motors :]
             self.actuators = ActuatorStates(model, self.numbers, self.strains, self.inputs, tensions)
 
+    @property
+    def valid(self) -> bool:
+        """Whether every section is in range; nothing else has a meaning otherwise."""
+        return self._sections is None or self._chain.valid
+
     @cached_property
     def tree(self) -> LoadedTree:
         """The joints under the loads."""
@@ -175,9 +180,8 @@ class AdjointRows:
         if at.slopes is not None:
             strains = self._weights[..., count:] @ np.swapaxes(at.slopes[0], -1, -2)
         self._move(strains, works=outputs.loads is not None)
-        motors, elastic = self._by_coordinates()
         by_actuators = np.zeros(self._weights.shape)
-        by_actuators[..., :count] = motors
+        by_actuators[..., :count], elastic = self.by_coordinates()
         if outputs.strains is not None:
             elastic = elastic + outputs.strains
         if at.slopes is not None:
@@ -220,7 +224,7 @@ class AdjointRows:
         twists, each = at.tree.twists(at.joint_rates(self._weights[..., : at.n_joint_motors], self.virtual))
         return twists, self._pose[0] + at.tree.work_slopes(twists, each)
 
-    def _by_coordinates(self) -> tuple[FloatArray, FloatArray]:
+    def by_coordinates(self) -> tuple[FloatArray, FloatArray]:
         """Derivatives of pose and work by motor joints and strains, at fixed rates."""
         at = self._at
         motors, by_strains = at.by_coordinates(self._motion[1], self.virtual)
@@ -277,8 +281,7 @@ class AdjointRows:
 
     def _of_held_directions(self, actuators: ActuatorStates) -> dict[str, FloatArray]:
         """By the numbers that tell which sums of strains more lengths than needed hold."""
-        at = self._at
-        inverse = np.linalg.pinv(at.numbers["held_slopes"])
+        at, inverse = self._at, np.linalg.pinv(self._at.numbers["held_slopes"])
         missed = at.numbers["path_rest"] + actuators.changes - at.inputs
         sums = at.states.actuator_loads[:, at.n_joint_motors :] @ inverse
         felt = self._weights[..., at.n_joint_motors :] - actuators.arms(self.virtual)

@@ -249,7 +249,7 @@ def sensitivity(
     """Differentiate an equilibrium, or an estimated load, by parameters of the robot, of its actuators and of its loads.
 
     By implicit differentiation at the state (`softrobots.identification.residual_derivatives`): exact to 1e-8, without solving
-    for another equilibrium. The first call for a robot and names loads two robots for each name, which is kept. After that the
+    for another equilibrium. The first call for a robot and names loads four robots for each name, which is kept. After that the
     `gradient` of a new equilibrium, with all that is prepared for it, takes as long as 1.8 solved equilibria of an arm, and 0.8
     of a tendon arm, whatever the number of parameters; a further one of the same equilibrium as long as 0.7 and 0.35.
 

@@ -1,10 +1,13 @@
 """What a bad fit smells of: wrong units or frames, swapped or mirrored axes, shifted rows, commands of wrong sign or order.
 
-Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them.
+Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them. But
+where the rotation of the base is fitted, it hides most of a swapped axis, and other parameters hide more: then the robot is
+fitted again to the numbers with two axes swapped, or one mirrored, and told by a chi-square test.
 """
 
 from __future__ import annotations
 
+import contextlib
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -13,7 +16,9 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.errors import SoftRobotsError
 from softrobots.identification.identification import Identification
+from softrobots.identification.identify import identify
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
@@ -36,6 +41,17 @@ FAR_LESS = 0.25
 """What a remedy must leave of it to be told: residuals of at most half the size."""
 
 _FEWEST = 4  # rows
+_STEPS = 20  # of such a fit
+_SIGNIFICANT = 30.0  # gain of a fit to mirrored numbers in variances: 5 standard deviations and what six trials add
+_MIRRORED = {
+    "y, x, z": ((0, 1, 0), (1, 0, 0), (0, 0, 1)),
+    "z, y, x": ((0, 0, 1), (0, 1, 0), (1, 0, 0)),
+    "x, z, y": ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
+    "-x, y, z": ((-1, 0, 0), (0, 1, 0), (0, 0, 1)),
+    "x, -y, z": ((1, 0, 0), (0, -1, 0), (0, 0, 1)),
+    "x, y, -z": ((1, 0, 0), (0, 1, 0), (0, 0, -1)),
+}
+"""Orders of axes that no turn makes; each is its own inverse."""
 _MOST_SOLVED = 50  # rows in which other frames are tried
 _SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; other parameters are not right yet either
 _MUCH = 0.1  # share of the variance that no robot with the right columns leaves
@@ -54,6 +70,7 @@ def hints(found: Identification) -> list[str]:
         texts += suspicions(measured, predicted, rows.q_motors, name=key)
         if key.startswith(("positions.", "poses.")) and _unexplained(measured, predicted) > UNEXPLAINED:
             texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
+            texts += _other_axes(found, key, few) if len(texts) == before else []
         if len(texts) == before and (share := _unexplained(measured, predicted)) > _MUCH:
             texts.append(
                 f"{key}: {100.0 * share:.2g} % of the variance are left unexplained: are order and signs of the actuators "
@@ -161,6 +178,33 @@ def _other_frame(found: Identification, key: str, rows: Measurements, before: fl
     if shares[best] >= FAR_LESS * before:
         return []
     return [f"{key}: taking it for the frame {best} {_words(shares[best], before)}"]
+
+
+def _other_axes(found: Identification, key: str, few: slice) -> list[str]:
+    """The swap of two axes, or the mirrored axis, of positions with which a fit with a free base leaves far less, if any does.
+
+    With the sum of squares `S` of `n` numbers and `P` parameters, :math:`(n - P) (S - S') / S'` is the gain in variances.
+    """
+    if not key.startswith("positions.") or not any(name.startswith("base.rotation") for name in found.names):
+        return []
+    rows = found.fitted.measurements[few]
+    own = float(np.nansum(found.residuals[key][few] ** 2))
+    freedoms = np.count_nonzero(np.isfinite(found.residuals[key][few])) - len(found.names)
+    left, names = dict[str, float](), ParameterSet.of(found.model, found.names, rows.markers)
+    options: dict[str, Any] = {"priors": found.priors, "loss": found.loss, "max_iterations": _STEPS}
+    for words, change in _MIRRORED.items():
+        given = rows.arguments()
+        given["positions"] |= {key.partition(".")[2]: rows.measured[key] @ np.array(change)}
+        with contextlib.suppress(SoftRobotsError):
+            fit = identify(found.model, Measurements(**given), names, **options)
+            left[words] = float(np.nansum(fit.residuals[key] ** 2))
+    words = min(left, key=left.__getitem__, default="")
+    if not left or not own > 2.0 * left[words] or not freedoms * (own - left[words]) > _SIGNIFICANT * left[words]:
+        return []
+    return [
+        f"{key}: taking its x, y, z for {words}, and fitting again, leaves residuals of {math.sqrt(left[words] / own):.2g} of "
+        "the size: are two axes swapped, or is one mirrored?"
+    ]
 
 
 def _points(values: FloatArray) -> FloatArray:

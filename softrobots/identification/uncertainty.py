@@ -128,14 +128,17 @@ def uncertainty_from_blocks(jacobian: Any, residuals: Any, blocks: Any, *, prior
     labels, block_of = np.unique(np.asarray(blocks), return_inverse=True)
     if len(labels) < 2:
         raise ParameterError("blocks", blocks, "at least two different labels")
-    scores, alone = [], []
-    for block in range(len(labels)):
-        left, share, right = np.linalg.svd(fit.rows[block_of == block], full_matrices=False)
+    scores, alone, sizes = [], [], np.bincount(block_of)
+    order, ends = np.argsort(block_of, kind="stable"), np.cumsum(sizes)
+    for size in np.unique(sizes):  # blocks of one size at once
+        rows = order[ends[sizes == size, None] - np.arange(size, 0, -1)]
+        left, share, right = np.linalg.svd(fit.rows[rows], full_matrices=False)
         lacking = 1.0 - share**2
-        scores.append((left.T @ fit.residuals[block_of == block] * share / np.maximum(lacking, _ALONE)) @ right)
+        along = (fit.residuals[rows][:, None] @ left)[:, 0] * share / np.maximum(lacking, _ALONE)
+        scores.append((along[:, None] @ right)[:, 0])
         alone.append(right[lacking < _ALONE])
     factor = (len(labels) - 1) / len(labels)
-    found = np.array(scores)
+    found = np.vstack(scores)
     return fit.uncertainty(factor * found.T @ found, len(labels) - 1.0, np.vstack(alone))
 
 

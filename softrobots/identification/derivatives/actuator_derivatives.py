@@ -46,6 +46,7 @@ class ActuatorStates:
         """Whether the actuators pull by their laws; otherwise their lengths are given."""
         if self.by_law:
             self._differentiate_laws(inputs)
+            self._tensions = self.pulls
 
     def _at_paths(self, strains: FloatArray) -> FloatArray:
         """Section coordinates of each path, shape (..., n_paths, 4), of strains, shape (..., n_strains)."""
