@@ -231,16 +231,10 @@ class _Moving(NamedTuple):
     def last(self, record: _Record, block: Block) -> _Moving:
         """Return the same at the last stage."""
         at = partial(record.last, block)
-        joints = [
-            replace(
-                one,
-                axis=at(one.axis),
-                shift=None if one.shift is None else at(one.shift),
-                axes=at(one.axes),
-                force=at(one.force),
-            )
-            for one in self.joints
-        ]
+        joints = []
+        for one in self.joints:
+            shift = None if one.shift is None else at(one.shift)
+            joints.append(JointLine(at(one.axis), shift, at(one.axes), one.body, at(one.force)))
         return _Moving(joints, self.wrenches, at(self.reach), at(self.slopes), self.torques)
 
 

@@ -1,4 +1,4 @@
-"""Pairs of floats for numba: the numbers of both stages of a step, on which the vector instructions of a processor work at once.
+"""Pairs of floats for numba: numbers at both stages of a step, on which the vector instructions of a processor work at once.
 
 Loops over both stages in generated code (`softrobots.compiled.trace.blocks`) become straight-line code with pairs. LLVM itself
 vectorises few of them: it does not know that the places that a function reads and writes are different ones, and two rounds
@@ -54,7 +54,7 @@ def _first(index: str) -> str:
     return re.sub(r"\bstage\b", "0", index)
 
 
-class Pair(types.Type):  # type: ignore[misc]
+class Pair(types.Type):
     """Type of two floats."""
 
     def __init__(self) -> None:
@@ -62,7 +62,7 @@ class Pair(types.Type):  # type: ignore[misc]
         super().__init__(name="Pair")
 
 
-class Truths(types.Type):  # type: ignore[misc]
+class Truths(types.Type):
     """Type of what a comparison of pairs tells."""
 
     def __init__(self) -> None:
@@ -74,11 +74,11 @@ PAIR, TRUTHS = Pair(), Truths()
 
 
 def _model(vector: ir.VectorType) -> type:
-    class Model(models.PrimitiveModel):  # type: ignore[misc]
+    class Model(models.PrimitiveModel):
         """A vector of LLVM."""
 
         def __init__(self, manager: Any, kind: types.Type) -> None:
-            super().__init__(manager, kind, vector)
+            super().__init__(manager, kind, vector)  # type: ignore[no-untyped-call]
 
     return Model
 
@@ -99,7 +99,7 @@ def _spread(context: Any, builder: ir.IRBuilder, value: ir.Value, kind: types.Ty
 def _define(operation: Any, result: types.Type, build: Callable[..., ir.Value]) -> None:
     """Define an operation on two pairs, or on a pair and a number."""
 
-    class Template(AbstractTemplate):  # type: ignore[misc]
+    class Template(AbstractTemplate):
         def generic(self, args: tuple[types.Type, ...], kws: dict[str, Any]) -> Any:
             """Return the signature, if one of the arguments is a pair."""
             fits = len(args) == 2 and PAIR in args and all(isinstance(one, (Pair, types.Number)) for one in args)
@@ -121,7 +121,7 @@ for _operation, _name in ((operator.lt, "<"), (operator.gt, ">")):
 
 
 @infer_global(operator.neg)
-class _Negative(AbstractTemplate):  # type: ignore[misc]
+class _Negative(AbstractTemplate):
     def generic(self, args: tuple[types.Type, ...], kws: dict[str, Any]) -> Any:
         """Return the signature, if the argument is a pair."""
         return signature(PAIR, PAIR) if args == (PAIR,) else None
@@ -150,7 +150,7 @@ def _function(name: str) -> Any:
 fabs, floor, sqrt = _function("fabs"), _function("floor"), _function("sqrt")
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def where(context: Any, condition: types.Type, a: types.Type, b: types.Type) -> Any:
     """Return `a` where the condition holds, else `b`: a select from the start, which can be vectorised, unlike a branch."""
     if condition == TRUTHS:
@@ -164,7 +164,7 @@ def where(context: Any, condition: types.Type, a: types.Type, b: types.Type) -> 
     return single, lambda context, builder, called, values: builder.select(*values)
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def load_pair(context: Any, w: types.Type, first: types.Type) -> Any:
     """Read two numbers of an array."""
 
@@ -176,7 +176,7 @@ def load_pair(context: Any, w: types.Type, first: types.Type) -> Any:
     return PAIR(w, types.intp), build
 
 
-@intrinsic  # type: ignore[untyped-decorator]
+@intrinsic
 def store_pair(context: Any, w: types.Type, first: types.Type, value: types.Type) -> Any:
     """Write two numbers of an array."""
 
