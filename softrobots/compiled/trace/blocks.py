@@ -200,7 +200,7 @@ def _constant(value: float) -> tuple[str, int]:
 def _element(array: str, base: str, offset: int, lanes: bool) -> str:
     index = str(offset) if not base else base if offset == 0 else f"{base} + {offset}"
     if lanes and array == WORKSPACE:
-        index = f"{index} * LANES + lane" if not base or offset == 0 else f"({index}) * LANES + lane"
+        index = f"({index}) * LANES + lane" if " " in index else f"{index} * LANES + lane"
     return f"{array}[{index}]"
 
 
