@@ -55,6 +55,15 @@ def placing_blocks(layout: MotionLayout) -> list[Block]:
     return blocks
 
 
+def place_block(layout: MotionLayout, places: Sequence[int]) -> Block:
+    """Return the function that writes an unknown `i` at both stages, side by side, and its velocity and acceleration."""
+    block = Block("place_stages", "Place an unknown at both stages.", ("i", "at"))
+    for stage in range(2):
+        for begin, value in zip(places, stage_values(layout, block, stage, base="i"), strict=True):
+            block.store(begin + stage, value, "at")
+    return block
+
+
 def keep_block(place: int, count: int) -> Block:
     """Return the function that keeps the torque on a strain at the first stage, before those of the second are written."""
     block = Block("keep_first_stage", "Keep the torque on a strain at the first stage.", ("i",))

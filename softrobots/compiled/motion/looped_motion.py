@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -45,8 +46,10 @@ class GroupLayout:
     """Number of unknown strains."""
     parts: int = 1
     """Parts of a number of the elimination: 2 where it is complex."""
+    stages: int = 1
+    """Stages that are evaluated side by side; numbers of both stand side by side, too."""
     frame: int = field(init=False)
-    """Axes, angular velocity, angular acceleration and acceleration behind the last group of the outward pass (18)."""
+    """Axes, angular velocity, angular acceleration and acceleration behind the last group of the outward pass (18, stages)."""
     origin: int = field(init=False)
     """Position of its origin, where the tip is asked for [m] (3)."""
     inertia: int = field(init=False)
@@ -54,7 +57,7 @@ class GroupLayout:
     pull: int = field(init=False)
     """Forces on all beyond: their sum, and the products of levers and forces (12)."""
     wrench: int = field(init=False)
-    """Moment and force that all bodies beyond need (6)."""
+    """Moment and force that all bodies beyond need (6, stages)."""
     sums: int = field(init=False)
     """`s` of the elimination (6), or real and imaginary parts."""
     answer: int = field(init=False)
@@ -62,9 +65,11 @@ class GroupLayout:
     base: int = field(init=False)
     """Frame behind the leading motors (18)."""
     cosine: int = field(init=False)
-    """Cosine of each unknown that is an angle of a joint (n)."""
+    """Cosine of each unknown that is an angle of a joint (n, stages)."""
     sine: int = field(init=False)
-    """Its sine (n)."""
+    """Its sine (n, stages)."""
+    state: int = field(init=False)
+    """The unknowns, their rates and accelerations, and torques of actuators, at stages side by side (4, n, stages)."""
     bounds: int = field(init=False)
     """First and last bound of the loops (2)."""
     end: int = field(init=False)
@@ -72,17 +77,29 @@ class GroupLayout:
 
     def __post_init__(self) -> None:
         """Compute the places."""
-        n, k = self.unknowns, self.parts
-        passes = dict(frame=18, origin=3, inertia=21 * k, pull=12, wrench=6, sums=6 * k, answer=6 * k)
-        assign_places(self, self.first, **passes, base=18, cosine=n, sine=n, bounds=2, end=0)
+        n, k, s = self.unknowns, self.parts, self.stages
+        passes = dict(frame=18 * s, origin=3, inertia=21 * k, pull=12, wrench=6 * s, sums=6 * k, answer=6 * k)
+        state = 4 * n * s if s > 1 else 0
+        assign_places(self, self.first, **passes, base=18, cosine=n * s, sine=n * s, state=state, bounds=2, end=0)
+
+    @property
+    def index(self) -> str:
+        """Base of the numbers at all stages, in loops over them."""
+        return "" if self.stages == 1 else "stage"
+
+    @property
+    def loop(self) -> tuple[str, int] | None:
+        """The loop over the stages."""
+        return None if self.stages == 1 else ("stage", self.stages)
 
 
 class _Record:
-    """Values of a group for later passes, in the workspace from `at` on."""
+    """Values of a group for later passes, in the workspace from `at` on, of a function with a loop at all `stages`."""
 
-    def __init__(self) -> None:
+    def __init__(self, stages: int) -> None:
         """Begin without values."""
         self.size = 0
+        self._stages = stages
         self._kept: dict[int, Expression] = {}
 
     def keep(self, block: Block, values: Any) -> Any:
@@ -104,10 +121,22 @@ class _Record:
         if isinstance(negative, Expression) and negative.number in self._kept:
             return -self._kept[negative.number]
         if value.number not in self._kept:
-            block.store(self.size, value, "at")
-            self._kept[value.number] = block.load(self.size, "at")
-            self.size += 1
+            base = "at" if block.loop is None else "at + stage"
+            block.store(self.size, value, base)
+            self._kept[value.number] = block.load(self.size, base)
+            self.size += 1 if block.loop is None else self._stages
         return self._kept[value.number]
+
+    def last(self, block: Block, values: Any) -> Any:
+        """Return what reads values that have been kept at all stages, at the last one."""
+        return np.vectorize(lambda value: self._last(block, value), otypes=[object])(values)
+
+    def _last(self, block: Block, value: Scalar) -> Scalar:
+        if not isinstance(value, Expression) or self._stages == 1:
+            return value
+        if value.operation == "neg":
+            return -self._last(block, value.arguments[0])
+        return block.load(value.arguments[2] + self._stages - 1, "at")
 
 
 def group_kinds(plan: MotionPlan, places: GroupLayout) -> list[Kind]:
@@ -124,36 +153,44 @@ def _trace_kind(
     number: int, groups: list[tuple[int, ...]], plan: MotionPlan, places: GroupLayout, parts: Sequence[ElementParts]
 ) -> Kind:
     names = ("at", "row", "q")
-    out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names)
-    factor, back, step, place = (
+    out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names, loop=places.loop)
+    back = Block(f"resist_{number}", "Inward pass: torques out of balance.", names, out.trace, loop=places.loop)
+    factor, step, place = (
         Block(f"{name}_{number}", purpose, names, out.trace)
         for name, purpose in (
             ("articulate", "Inward pass: articulated inertia and factors."),
-            ("resist", "Inward pass: torques out of balance."),
             ("correct", "Outward pass: correction of the accelerations."),
             ("place", "Outward pass with positions alone."),
         )
     )
-    columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), _Record()
-    group = MovingGroup(plan, out, groups, columns, parts)
+    columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), _Record(places.stages)
+    group = MovingGroup(plan, out, groups, columns, parts, places.state if places.stages > 1 else None)
     moving = _trace_move(out, record, places, group)
-    factors = _trace_factors(factor, record, plan, places, group, moving)
+    factors = _trace_factors(factor, record, plan, places, group, moving.last(record, factor))
 
-    total, loads = moved_wrench(vector(back.loads(places.wrench, 6)), moving.reach), []
+    stages = places.stages
+    total, loads = moved_wrench(vector(back.spaced(places.wrench, 6, stages, places.index)), moving.reach), []
     for joint, own in zip(moving.joints[::-1], moving.wrenches[::-1], strict=True):
         total = total + own
         loads.append(joint.load(total))
         total = total if joint.shift is None else moved_wrench(total, joint.shift)
-    back.store_all(places.wrench, total.tolist())
+    back.store_spaced(places.wrench, total.tolist(), stages, places.index)
     gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
     blocks, layout, n = [out, factor, back, step, place], plan.layout, places.unknowns
     if plan.reduces:
         written, read = plan.torques
-        back.store_all(written + (n if layout.in_stages else 0), gradient, "q")
+        if stages > 1:
+            back.store_spaced(written, gradient, stages, "2 * q + stage")
+        else:
+            back.store_all(written + (n if layout.in_stages else 0), gradient, "q")
         back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
         blocks.append(back)
-        stages = [back.loads(read + stage * n, len(gradient), "q") for stage in range(places.parts)]
-        gradient = right_hand_side(*stages) if layout.in_stages else [*stages[0]]
+        spaced = plan.side_by_side and plan.routes is None
+        sides = [
+            back.spaced(read + stage, len(gradient), 2, "2 * q") if spaced else back.loads(read + stage * n, len(gradient), "q")
+            for stage in range(places.parts)
+        ]
+        gradient = right_hand_side(*sides) if layout.in_stages else [*sides[0]]
     reduced, sums = carried_inward(factors, gradient, _loaded(back, places.sums, 6, places))
     _store(back, places.sums, sums, places)
     kept = record.keep(back, vector(reduced)).tolist()
@@ -162,7 +199,7 @@ def _trace_kind(
     for stage, one in enumerate(corrections(shares) if layout.in_stages else (shares.tolist(),)):
         step.store_all(plan.correction + stage * n, one, "q")
     _store(step, places.answer, answer, places)
-    _trace_place(place, places, group)
+    _trace_place(place, places, group, plan.strains[0])
     return Kind(number, [group[0] for group in groups], blocks, columns, record.size)
 
 
@@ -191,9 +228,18 @@ class _Moving(NamedTuple):
     torques: Any
     """Torque of spring, damper and muscles on each unknown (k)."""
 
+    def last(self, record: _Record, block: Block) -> _Moving:
+        """Return the same at the last stage."""
+        at = partial(record.last, block)
+        joints = []
+        for one in self.joints:
+            shift = None if one.shift is None else at(one.shift)
+            joints.append(JointLine(at(one.axis), shift, at(one.axes), one.body, at(one.force)))
+        return _Moving(joints, self.wrenches, at(self.reach), at(self.slopes), self.torques)
+
 
 def _trace_move(out: Block, record: _Record, places: GroupLayout, group: MovingGroup) -> _Moving:
-    frame = load_frame(out, places.frame)
+    frame = load_frame(out, places.frame, places.stages, places.index)
     states, slopes = group.joints(out, places.cosine, places.sine)
     turns = {place: element.rotation for place, element in enumerate(group.elements)}
     joints, wrenches = [], []
@@ -208,7 +254,7 @@ def _trace_move(out: Block, record: _Record, places: GroupLayout, group: MovingG
         joints.append(JointLine(record.keep(out, axis), kept_shift, axes, body, wrenches[-1][3:]))
     frame = replace(frame, axes=frame.axes @ group.turn)
     reach = frame.axes @ group.reach
-    store_frame(out, places.frame, frame.shifted(range(3), group.reach))
+    store_frame(out, places.frame, frame.shifted(range(3), group.reach), places.stages, places.index)
     return _Moving(joints, wrenches, *(record.keep(out, one) for one in (reach, slopes, vector(group.torques))))
 
 
@@ -231,9 +277,9 @@ def _trace_factors(
     return ArticulatedGroup(eliminated, *copies)
 
 
-def _trace_place(block: Block, places: GroupLayout, group: MovingGroup) -> None:
+def _trace_place(block: Block, places: GroupLayout, group: MovingGroup, strains: int) -> None:
     axes, origin = vector(block.loads(places.frame, 9)).reshape(3, 3), vector(block.loads(places.origin, 3))
-    for element in group.elements:
+    for element in group.elements_at(block, strains):
         axes = axes @ element.rotation
         if element.kind == "section":
             screw = Screw(element.coordinates, element.length)
@@ -247,12 +293,12 @@ def _trace_place(block: Block, places: GroupLayout, group: MovingGroup) -> None:
     block.store_all(places.origin, (origin + axes @ group.reach).tolist())
 
 
-def load_frame(block: Block, place: int) -> MovingFrame:
+def load_frame(block: Block, place: int, spacing: int = 1, base: str = "") -> MovingFrame:
     """Read a frame."""
-    values = vector(block.loads(place, 18))
+    values = vector(block.spaced(place, 18, spacing, base))
     return MovingFrame(values[:9].reshape(3, 3), values[9:12], values[12:15], values[15:])
 
 
-def store_frame(block: Block, place: int, frame: MovingFrame) -> None:
+def store_frame(block: Block, place: int, frame: MovingFrame, spacing: int = 1, base: str = "") -> None:
     """Write a frame."""
-    block.store_all(place, [*frame.axes.ravel().tolist(), *frame.spin, *frame.turning, *frame.lift])
+    block.store_spaced(place, [*frame.axes.ravel().tolist(), *frame.spin, *frame.turning, *frame.lift], spacing, base)

@@ -38,10 +38,12 @@ class MovingGroup:
         groups: Sequence[tuple[int, ...]],
         columns: TableColumns,
         parts: Sequence[ElementParts],
+        state: int | None = None,
     ) -> None:
         """Read the elements of the groups, base to tip, and their `moving_parts`.
 
-        In the block `q` is the place of the first unknown, or of the motor.
+        In the block `q` is the place of the first unknown, or of the motor. Both stages of the unknowns, if the block loops
+        over them, and of what actuators do to them stand side by side from `state` on.
         """
         unknowns, layout = plan.unknowns, plan.layout
         self.elements: list[TracedElement] = []
@@ -66,6 +68,10 @@ class MovingGroup:
         place, routes = 0, plan.routes
         beside = [] if routes is None else [routes.unknowns.moving(row) for row in routes.routes.beside]
         within = {strain: number for strains in beside for number, strain in enumerate(strains)}
+        self._spacing, self._base = spacing, base = (1, "q") if state is None else (2, "2 * q + stage")
+        firsts = [*plan.strains[:3], 0 if routes is None else routes.pulls]
+        if state is not None:
+            firsts = [state + 2 * len(unknowns.strains) * number for number in range(4)]
         for rows in zip(*groups, strict=True):
             ones = [unknowns.traced(row) for row in rows]
             element = replace(table_element(ones, columns), rotation=columns.entries([parts[row].rotation for row in rows]))
@@ -78,9 +84,10 @@ class MovingGroup:
                     block.load(first, "q") for first in (0, layout.motor_velocities, layout.motor_accelerations)
                 )
             for number, axis in enumerate(element.moving):
-                coordinates[axis], rates[axis], changes[axis], damping = (
-                    block.load(first + place, "q") for first in plan.strains
+                coordinates[axis], rates[axis], changes[axis] = (
+                    block.load(first + spacing * place, base) for first in firsts[:3]
                 )
+                damping = block.load(plan.strains[3] + place, "q")
                 stiffness = element.stiffness[number]
                 self.own.append(half * damping + quarter * stiffness)
                 torque = (coordinates[axis] - rest[number]) * stiffness
@@ -88,7 +95,7 @@ class MovingGroup:
                     torque = torque + damping * rates[axis]
                 column = within.get(unknowns.moving(rows[0])[number])
                 if routes is not None and column is not None:
-                    torque = torque + block.load(routes.pulls + place, "q")
+                    torque = torque + block.load(firsts[3] + spacing * place, base)
                     for row in range(column + 1) if not routes.held else ():
                         pair = place - column + row, place
                         at = routes.curvatures + len(unknowns.strains) * column + pair[0]
@@ -121,9 +128,21 @@ class MovingGroup:
         for place, (element, rates, changes) in enumerate(zip(self.elements, self.rates, self.changes, strict=True)):
             joint = joint_state(element.kind == "slide", element.coordinates[0], rates[0], changes[0])
             if element.kind == "turn" and element.moving:
-                joint = joint._replace(cosine=block.load(cosines + place, "q"), sine=block.load(sines + place, "q"))
+                cosine, sine = (block.load(one + self._spacing * place, self._base) for one in (cosines, sines))
+                joint = joint._replace(cosine=cosine, sine=sine)
             joints.append(joint)
         return joints, constants(np.eye(len(joints), len(self.own)))
+
+    def elements_at(self, block: Block, strains: int) -> list[TracedElement]:
+        """Return the elements at the unknowns that stand from a place on."""
+        placed, place = [], 0
+        for element in self.elements:
+            coordinates = [*element.coordinates]
+            for axis in element.moving:
+                coordinates[axis] = block.load(strains + place, "q")
+                place += 1
+            placed.append(replace(element, coordinates=coordinates))
+        return placed
 
 
 def _body(bodies: Sequence[ChainBody], columns: TableColumns) -> RigidBody:

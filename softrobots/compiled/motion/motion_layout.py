@@ -184,13 +184,18 @@ class MotionPlan:
         return self.layout.in_stages or self.routes is not None or self.layout.full_damping
 
     @property
+    def side_by_side(self) -> bool:
+        """Whether both stages of a step are evaluated at once; what holds given lengths is found stage by stage."""
+        return self.layout.in_stages and (self.routes is None or not self.routes.held)
+
+    @property
     def torques(self) -> tuple[int, int]:
         """Where torques out of balance are written, and where they are read to be eliminated, at all stages."""
         return (self.layout.forces, self.layout.forces) if self.routes is None else (self.routes.torques, self.routes.sides)
 
     @property
     def last_torques(self) -> int:
-        """Where the torques out of balance of the stage that is evaluated are written."""
+        """Where the torques out of balance of the stage that is evaluated are written, one stage after the other."""
         return self.torques[0] + ((self.layout.strains or 0) if self.layout.in_stages else 0)
 
     def massive(self, block: Block) -> Scalar:

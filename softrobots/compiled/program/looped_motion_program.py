@@ -8,7 +8,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.unrolled_chain import place_base
-from softrobots.compiled.motion.gauss_step import keep_block, placing_blocks
+from softrobots.compiled.motion.gauss_step import keep_block, place_block, placing_blocks
 from softrobots.compiled.motion.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
 from softrobots.compiled.motion.motion_groups import motion_groups, reach_behind
 from softrobots.compiled.motion.motion_layout import MotionPlan
@@ -16,7 +16,6 @@ from softrobots.compiled.motion.moving_joints import MovingFrame, joint_state, m
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_actuators import actuator_parts
 from softrobots.compiled.program.motion_parts import MotionParts
-from softrobots.compiled.routes.motion_lengths import MASSIVE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import cosine, sine
 
@@ -33,7 +32,7 @@ _INWARD = ("articulate", "resist", "reduce")
 _MOVE = """    start_move_SUFFIX(w)
 BEND    move_all_SUFFIX(w)
 """
-_BEND = """    for i in range(N_STRAINS):
+_BEND = """    for i in range(N_BENDS):
         bend_SUFFIX(w, i)
 """
 _ARTICULATE = """    start_articulate_SUFFIX(w)
@@ -59,6 +58,29 @@ def resist_stages_SUFFIX(w: Array) -> None:
 
 
 '''
+_SIDE_BY_SIDE = '''def resist_stages_SUFFIX(w: Array) -> None:
+    """Evaluate both stages side by side."""
+    for i in range(N):
+        place_stages_SUFFIX(w, i, 2 * i)
+EVALUATE
+
+'''
+_PULLS = """    for i in range(N):
+        place_first_stage_SUFFIX(w, i)
+    follow_actuators_SUFFIX(w)
+    for i in range(N_STRAINS):
+        keep_pull_SUFFIX(w, i, 2 * i)
+    for i in range(N):
+        place_second_stage_SUFFIX(w, i)
+    follow_actuators_SUFFIX(w)
+    for i in range(N_STRAINS):
+        keep_pull_SUFFIX(w, i, 2 * i + 1)
+"""
+_MASSIVE = """    for i in range(N):
+        for j in range(N):
+            for stage in range(N_STAGES):
+                add_mass_SUFFIX(w, N_STAGES * i + stage, N * i + j, N_STAGES * j + stage)
+"""
 _CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
     """Evaluate and factor; write the correction."""
 FACTOR
@@ -80,18 +102,20 @@ def _control(plan: MotionPlan, bends: bool) -> str:
     held = routes is not None and routes.held
     move, resist, articulate, solve = _MOVE, _RESIST, _ARTICULATE, "    correct_all_SUFFIX(w)\n"
     if routes is not None:
-        move = f"    {'move_lengths' if held else 'follow_actuators'}_SUFFIX(w)\n" + move
+        follow = f"    {'move_lengths' if held else 'follow_actuators'}_SUFFIX(w)\n"
+        move = (_PULLS if plan.side_by_side else follow) + move
         resist += "    free_torques_SUFFIX(w)\n" if held else ""
         articulate += "    factor_border_SUFFIX(w)\n"
         solve = "    correct_strains_SUFFIX(w)\n" + ("    free_corrections_SUFFIX(w)\n" if held else "")
     elif plan.reduces:
         solve = "    reduce_all_SUFFIX(w)\n" + solve
-    resist += MASSIVE if plan.layout.full_damping and not held else ""
+    resist += _MASSIVE if plan.layout.full_damping and not held else ""
     evaluate = ("    resist_stages_SUFFIX(w)\n", "") if in_stages else (move, resist)
     text = _CONTROL.replace("FACTOR", evaluate[0] + articulate + evaluate[1] + solve)
     text = text.replace("CORRECT", "".join(evaluate) + solve)
     text = text.replace("TIP", "    close_lengths_SUFFIX(w)\n" if held else "")
-    text = _AT_STAGES.replace("EVALUATE", move + resist) + text if in_stages else text
+    stages = _SIDE_BY_SIDE if plan.side_by_side else _AT_STAGES
+    text = stages.replace("EVALUATE", move + resist) + text if in_stages else text
     return text.replace("BEND", _BEND if bends else "")
 
 
@@ -100,7 +124,8 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     unknowns, layout, routes = plan.unknowns, plan.layout, plan.routes
     in_stages, n = layout.in_stages, len(unknowns.strains)
     passes = _PASSES | ({"reduce": _REDUCE} if plan.reduces else {})
-    places = GroupLayout(layout.prepared if routes is None else routes.end, n, 2 if in_stages else 1)
+    parts, stages = 2 if in_stages else 1, 2 if plan.side_by_side else 1
+    places = GroupLayout(layout.prepared if routes is None else routes.end, n, parts, stages)
     actuators = None if routes is None else actuator_parts(plan, routes)
     kinds = group_kinds(plan, places)
     record, sequence = places.end, {}
@@ -121,16 +146,16 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     frame = [
         _prepare(plan, places, len(ordered)),
         _start_move(places),
-        *([_bend(plan, places)] if bends else []),
+        *([_bend(places, places.state if plan.side_by_side else plan.strains[0])] if bends else []),
         _start_articulate(plan, places),
         _start_resist(plan, places),
         _start_place(plan, places, len(ordered)),
         _finish_place(plan, places),
-        *([*placing_blocks(layout), keep_block(plan.torques[0], n)] if in_stages else []),
+        *_stage_blocks(plan, places),
         *([] if actuators is None else [_start_reduce(places), *actuators.blocks]),
-        *([_add_mass(plan)] if layout.full_damping else []),
+        *([_add_mass(plan, places)] if layout.full_damping else []),
     ]
-    tables |= {"N_STRAINS": n} | ({} if actuators is None else actuators.tables)
+    tables |= {"N_STRAINS": n, "N_BENDS": n * stages, "N_STAGES": stages} | ({} if actuators is None else actuators.tables)
     loops, lane_loops = (
         [
             *([] if actuators is None else actuators.loops(suffix)),
@@ -160,14 +185,28 @@ def _prepare(plan: MotionPlan, places: GroupLayout, count: int) -> Block:
 
 def _start_move(places: GroupLayout) -> Block:
     block = Block("start_move", "Start at the base.")
-    store_frame(block, places.frame, load_frame(block, places.base))
+    for stage in range(places.stages):
+        store_frame(block, places.frame + stage, load_frame(block, places.base), places.stages)
     return block
 
 
-def _bend(plan: MotionPlan, places: GroupLayout) -> Block:
+def _stage_blocks(plan: MotionPlan, places: GroupLayout) -> list[Block]:
+    """Trace the functions that place both stages of a step."""
+    layout, routes, n = plan.layout, plan.routes, places.unknowns
+    if not plan.side_by_side:
+        return [*placing_blocks(layout), keep_block(plan.torques[0], n)] if layout.in_stages else []
+    blocks = [place_block(layout, [places.state + 2 * n * number for number in range(3)])]
+    if routes is not None:
+        keep = Block("keep_pull", "Keep the torque of the actuators on a strain at a stage.", ("i", "at"))
+        keep.store(places.state + 6 * n, keep.load(routes.pulls, "i"), "at")
+        blocks += [*placing_blocks(layout), keep]
+    return blocks
+
+
+def _bend(places: GroupLayout, strains: int) -> Block:
     """They do not depend on each other, so that compilers vectorise the loop."""
     block = Block("bend", "Compute cosine and sine of an unknown.", ("i",))
-    angle = block.load(plan.strains[0], "i")
+    angle = block.load(strains, "i")
     block.store(places.cosine, cosine(angle), "i")
     block.store(places.sine, sine(angle), "i")
     return block
@@ -182,20 +221,20 @@ def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
 
 def _start_resist(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_resist", "Start at the tip with its force, and clear all sums.")
-    block.store_all(places.wrench, [0.0, 0.0, 0.0, *_tip_force(plan, block)])
+    for stage in range(places.stages):
+        block.store_spaced(places.wrench + stage, [0.0, 0.0, 0.0, *_tip_force(plan, block)], places.stages)
     block.store_all(places.sums, [0.0] * 6 * places.parts)
     block.store_all(places.answer, [0.0] * 6 * places.parts)
     return block
 
 
-def _add_mass(plan: MotionPlan) -> Block:
-    block, layout, routes = (
-        Block("add_mass", "Add a part of Rayleigh's term for the mass.", ("i", "at", "j")),
-        plan.layout,
-        plan.routes,
-    )
-    to = plan.last_torques if routes is None or not routes.held else routes.dampers
-    block.store(to, block.load(to, "i") + block.load(layout.mass_damping, "at") * block.load(layout.rate, "j"), "i")
+def _add_mass(plan: MotionPlan, places: GroupLayout) -> Block:
+    block = Block("add_mass", "Add a part of Rayleigh's term for the mass.", ("i", "at", "j"))
+    layout, routes = plan.layout, plan.routes
+    to, rate = plan.torques[0] if routes is None or not routes.held else routes.dampers, layout.rate
+    if plan.side_by_side:
+        rate = places.state + 2 * places.unknowns
+    block.store(to, block.load(to, "i") + block.load(layout.mass_damping, "at") * block.load(rate, "j"), "i")
     return block
 
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from softrobots.compiled.motion.gauss_step import corrections, right_hand_side, stage_values
+from softrobots.compiled.motion.gauss_step import corrections, place_block, right_hand_side
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.unrolled_motion import (
     factored,
@@ -96,10 +96,7 @@ def _stage_blocks(plan: MotionPlan, prepare: Block) -> tuple[list[Block], int]:
     layout, n, trace = plan.layout, plan.layout.unknowns, prepare.trace
     count = n * (n + 1)  # real numbers of the factors
     unknown, rate, change, cosines, sines, torques, first = (layout.prepared + count + 2 * n * place for place in range(7))
-    place = Block("place_stages", "Place an unknown at both stages.", ("i", "at"))
-    for stage in range(2):
-        for begin, value in zip((unknown, rate, change), stage_values(layout, place, stage, base="i"), strict=True):
-            place.store(begin + stage, value, "at")
+    place = place_block(layout, (unknown, rate, change))
     evaluate = Block("stage_torques", "Write the torques out of balance at both stages.", trace=trace, loop=("stage", 2))
     state = [[evaluate.load(begin + 2 * row, "stage") for row in range(n)] for begin in (unknown, rate, change)]
     bends = [(cosine(one), sine(one)) for one in state[0]]

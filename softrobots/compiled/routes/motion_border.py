@@ -134,7 +134,8 @@ def border_blocks(plan: MotionPlan, routes: MotionRoutes) -> list[Block]:
     row.store(routes.sides, row.load(routes.arms, "row"), "i")
     torque = Block("take_torque", "Take the torques out of balance as right-hand side.", ("i",))
     for stage in range(parts):
-        torque.store(routes.sides + stage * n, torque.load(routes.torques + stage * n, "i"), "i")
+        place, index = (stage, "2 * i") if plan.side_by_side else (stage * n, "i")
+        torque.store(routes.sides + stage * n, torque.load(routes.torques + place, index), "i")
         if stage:
             row.store(routes.sides + stage * n, 0.0, "i")
     keep = Block("keep_answer", "Keep the answer to a row of the border.", ("i", "row"))

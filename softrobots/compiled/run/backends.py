@@ -20,8 +20,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.drivers import intrinsics, trigonometry
-from softrobots.compiled.program.generated_module import Program, functions_of
+from softrobots.compiled.drivers import intrinsics
+from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.run.numpy_batches import MotionBatches, NumpyBatches
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import MissingDependency, OutputError
@@ -35,25 +35,12 @@ BACKENDS = ("numba", "python")
 
 _NUMBA_HEAD = """from __future__ import annotations
 
-from math import fabs, sqrt
-
 import numpy as np
 from numba import njit
-from numba.core.types import boolean, float64
-from numba.extending import intrinsic
+
+from softrobots.compiled.run.pairs import fabs, floor, load_pair, sqrt, store_pair, where
 
 zeros = np.zeros
-
-
-@intrinsic
-def where(context, condition, a, b):
-    # A select from the start: loops over two stages are not vectorised where it comes from a branch.
-    return float64(boolean, float64, float64), lambda context, builder, signature, values: builder.select(*values)
-
-
-@njit(inline="always")
-def floor(x):
-    return np.floor(x)
 
 """
 _JIT = "@njit(cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, fastmath={'contract', 'arcp', 'nsz'})\n"
@@ -139,7 +126,9 @@ class NumbaRun(Run):
         """
         if importlib.util.find_spec("numba") is None:
             raise MissingDependency("numba", "fast")
-        functions = _decorated(program.text + "\n\n" + program.lane_text)
+        from softrobots.compiled.run.pairs import in_pairs
+
+        functions = _decorated(in_pairs(program.text) + "\n\n" + program.lane_text)
         functions = re.sub(r"^([A-Z_0-9]+) = (\(.*\))$", r"\1 = np.array(\2)", functions, flags=re.MULTILINE)
         head, rest = functions.split('"""\n', 1)  # the docstring stays first
         super().__init__(program, _module(f'{head}"""\n\n{_NUMBA_HEAD}\n{rest}'))
@@ -151,16 +140,8 @@ def jitted(constants: str, functions: str) -> ModuleType:
 
 
 def _decorated(functions: str) -> str:
-    """Return functions with numba's decorators.
-
-    Calls within a loop over both stages of a step keep LLVM from vectorising it. Sine and cosine are inlined for such loops
-    alone, since numba then takes half as long again to compile.
-    """
-    inlined = [one.__name__ for one in functions_of(trigonometry)] if "for stage in range" in functions else []
-    return re.sub(
-        r"^def (\w+)", lambda found: ('@njit(inline="always")\n' if found[1] in inlined else _JIT) + found[0], functions,
-        flags=re.MULTILINE,
-    )  # fmt: skip
+    """Return functions with numba's decorators."""
+    return re.sub(r"^def ", _JIT + "def ", functions, flags=re.MULTILINE)
 
 
 def _module_of(code: Any, **functions: Callable[[Any], Any]) -> ModuleType:

@@ -38,7 +38,7 @@ class Block:
     stores: list[tuple[str, int, Scalar]] = field(default_factory=list)
     """Its results: base, offset, value."""
     loop: tuple[str, int] | None = None
-    """Name and number of the rounds of a loop over all that depends on this base; None: all is done once."""
+    """Name and number of the rounds of a loop over all that depends on bases with this name; None: all is done once."""
 
     def load(self, offset: int, base: str = "") -> Expression:
         """Return an element of the workspace."""
@@ -46,7 +46,11 @@ class Block:
 
     def loads(self, offset: int, count: int, base: str = "") -> list[Expression]:
         """Return consecutive elements of the workspace."""
-        return [self.load(offset + place, base) for place in range(count)]
+        return self.spaced(offset, count, 1, base)
+
+    def spaced(self, offset: int, count: int, spacing: int, base: str = "") -> list[Expression]:
+        """Return elements of the workspace at equal distances."""
+        return [self.load(offset + spacing * place, base) for place in range(count)]
 
     def table(self, table: str, offset: int, base: str) -> Expression:
         """Return an element of a table."""
@@ -58,8 +62,12 @@ class Block:
 
     def store_all(self, offset: int, values: Sequence[Scalar], base: str = "") -> None:
         """Write consecutive elements."""
+        self.store_spaced(offset, values, 1, base)
+
+    def store_spaced(self, offset: int, values: Sequence[Scalar], spacing: int, base: str = "") -> None:
+        """Write elements at equal distances."""
         for place, value in enumerate(values):
-            self.store(offset + place, value, base)
+            self.store(offset + spacing * place, value, base)
 
     def text(self, *, lanes: bool = False) -> str:
         """Return the text of the function, or of one for many cases: a loop over `LANES` numbers of each element."""
@@ -137,7 +145,8 @@ def _statements(stores: Sequence[tuple[str, int, Scalar]], lanes: bool, base: st
     expressions = in_order([value for _, _, value in stores])
     standing: set[int] = set()
     for one in expressions if base else ():
-        if one.arguments[1:2] != (base,) and all(operand.number in standing for operand in one.operands):
+        loops = one.operation == "load" and base in one.arguments[1]
+        if not loops and all(operand.number in standing for operand in one.operands):
             standing.add(one.number)
     uses = Counter(one.number for expression in expressions for one in expression.operands)
     uses.update(value.number for _, _, value in stores if isinstance(value, Expression))
@@ -191,7 +200,7 @@ def _constant(value: float) -> tuple[str, int]:
 def _element(array: str, base: str, offset: int, lanes: bool) -> str:
     index = str(offset) if not base else base if offset == 0 else f"{base} + {offset}"
     if lanes and array == WORKSPACE:
-        index = f"{index} * LANES + lane" if not base or offset == 0 else f"({index}) * LANES + lane"
+        index = f"({index}) * LANES + lane" if " " in index else f"{index} * LANES + lane"
     return f"{array}[{index}]"
 
 
