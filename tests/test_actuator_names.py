@@ -66,6 +66,7 @@ def test_names_in_any_order_are_the_actuators(order: list[int], seed: int) -> No
     assert MOUNTED.actuator_units == ("rad",) * 3 + ("m",) * 3
 
 
+@pytest.mark.study
 @each_row("call", CALLS)
 def test_every_function_takes_names(call: str) -> None:
     model = ARM if len(MOTORS) == 3 and call not in ("mounted", "capsule_error") else MOUNTED

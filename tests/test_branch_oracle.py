@@ -63,6 +63,7 @@ def missed(rng: np.random.Generator, flat: bool, starts: int, *, without: str = 
     return [one for one, path in zip(left, paths, strict=True) if meets(path, lines)], bent
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("flat", [False, True])
 def test_no_branch_is_missed_by_brute_force_and_continuation(flat: bool) -> None:
     found, bent = missed(np.random.default_rng(3), flat, 45)

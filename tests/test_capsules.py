@@ -45,6 +45,7 @@ def cores(model: sr.SoftModel, q: FloatArray | None = None) -> list[tuple[FloatA
     return [(data.oMi[one.joint].act(one.start), data.oMi[one.joint].act(one.end), one.radius) for one in robot_capsules(model)]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ROBOTS)
 def test_capsules_join_from_the_base_to_the_tip(name: str, rng: np.random.Generator) -> None:
     """At rest, and bent where every capsule is a piece of a link; 1e-12: rounding over 60 joints."""
@@ -342,6 +343,7 @@ def test_straight_links_are_exact_and_bad_coordinates_refused(arm: sr.SoftModel)
         sr.capsule_error(bent, [], np.full(bent.n_springs, 3.0))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("sections", [4, 20])
 @pytest.mark.parametrize("floor", [sr.HalfSpace((0, 0, 1)), sr.Box((4, 4, 1), (0, 0, -0.5))])
 def test_a_robot_stands_on_a_floor_without_touching_it(sections: int, floor: object) -> None:

@@ -98,6 +98,7 @@ def killed_after_first_block(words: list[str], folder: Path, block: str) -> None
     assert process.returncode == -signal.SIGKILL, said.decode()
 
 
+@pytest.mark.study
 def test_a_killed_run_goes_on_to_the_same_bytes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -137,6 +137,7 @@ def test_output_may_be_cut_off_by_whoever_reads_it() -> None:
     assert (cut.returncode, cut.stderr) == (141, "")  # as after SIGPIPE
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("words", [["urdf", "inflatable_arm"], ["urdf", "--list", "--json"]], ids=" ".join)
 def test_a_full_disk_behind_the_output_is_an_error_without_a_traceback(words: list[str]) -> None:
     if not Path("/dev/full").exists():
@@ -146,6 +147,7 @@ def test_a_full_disk_behind_the_output_is_an_error_without_a_traceback(words: li
     assert (done.returncode, done.stderr) == (2, "error: cannot write the answer: [Errno 28] No space left on device\n")
 
 
+@pytest.mark.study
 def test_closed_streams_are_no_reason_to_fail() -> None:
     command = " ".join(map(shlex.quote, COMMAND_LINES["module"]))
     script = f"{command} urdf --list >&-; echo $?; {command} urdf nobody 2>&-; echo $?"

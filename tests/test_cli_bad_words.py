@@ -49,6 +49,7 @@ def words_of(action: argparse.Action) -> st.SearchStrategy[list[str]]:
     return st.one_of(well, well, anyhow).map(lambda values: [action.option_strings[-1], *values])
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("command", NAMES)
 def test_any_words_end_with_a_status_and_a_message(command: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)

@@ -28,6 +28,7 @@ def one_robot(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("softrobots.cli.doctor._page", lambda report: None)
 
 
+@pytest.mark.study
 def test_doctor_finds_this_installation_well(told) -> None:
     status, out, err = told("doctor")
     assert status == 0
@@ -43,6 +44,7 @@ def test_doctor_finds_this_installation_well(told) -> None:
     assert err == ""  # progress bars are for terminals
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("one_robot")
 def test_doctor_asks_every_tool_if_told_and_answers_machines(told) -> None:
     """On one file, which is enough to see that they are asked; all of them are in tests/test_interop.py."""

@@ -548,6 +548,7 @@ def test_bench_times_every_job_and_writes_what_it_prints(told, tmp_path: Path) -
     assert [row["job"] for row in json.loads(out)["rows"]] == ["gravity", "batch"]
 
 
+@pytest.mark.study
 def test_bench_solves_the_same_cases_twice() -> None:
     """Every job, compiled and on Pinocchio: springs, loads and motors agree."""
     model = sr.load_model(sr.InflatableArm())

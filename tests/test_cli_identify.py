@@ -49,6 +49,7 @@ WORDS = ("identify", "poses.csv", "--robot", "inflatable_arm", "--columns", "col
 FIT = ("--fit", "stiffness, base.position")
 
 
+@pytest.mark.study
 @pytest.mark.filterwarnings("default:base and markers:UserWarning")
 def test_a_folder_holds_the_fit_and_a_robot_for_other_commands(folder: Path, told: Told) -> None:
     status, out, err = told(*WORDS, *FIT, "--hold-out", "day3", "-o", "fit", "--json")
@@ -116,6 +117,7 @@ def test_without_matplotlib_all_but_the_pictures_is_written(folder: Path, told: 
     assert {file.suffix for file in (folder / "fit").iterdir()} == {".txt", ".json", ".npz", ".csv", ".yaml", ".html"}
 
 
+@pytest.mark.study
 def test_sets_of_parameters_are_compared_on_families_left_out(folder: Path, told: Told) -> None:
     status, out, err = told(*WORDS, *FIT, "--fit", "stiffness", "--families", "day[0-9]", "--json")
     assert status == 0, err
@@ -173,6 +175,7 @@ def test_a_fit_that_ends_early_is_kept(
     assert message in (folder / message / "report.txt").read_text(encoding="utf-8")
 
 
+@pytest.mark.study
 def test_springs_of_a_foreign_file_are_options_of_other_commands(folder: Path, told: Told) -> None:
     Path("arm.urdf").write_text(sr.InflatableArm().urdf(), encoding="utf-8")
     words = ("identify", "poses.csv", "--robot", "arm.urdf", "--columns", "columns.yaml")

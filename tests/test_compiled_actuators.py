@@ -55,6 +55,7 @@ def push(model: sr.SoftModel, rng: np.random.Generator) -> np.ndarray:
     return rng.normal(size=3) * 0.2 * float(np.median(model.stiffness[model.springs.turning])) / model.reach
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("name", "gravity"), zip(ROBOTS, (GRAVITY, None) * len(ROBOTS), strict=False))
 def test_equilibria_are_those_of_the_general_engine(name: str, gravity: Any, rng: np.random.Generator) -> None:
     """One by one and as a batch, heavy or weightless in turn; all settle to 1e-12 of the load."""
@@ -200,6 +201,7 @@ ANY_LENGTHS: dict[str, Callable[[], sr.SoftModel]] = {
 """More lengths than a segment has directions to choose, and fewer."""
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ANY_LENGTHS)
 def test_any_number_of_given_lengths(name: str, rng: np.random.Generator) -> None:
     """Of a random shape without twist: springs, tensions, the Jacobian and steps of time are those of the general engine."""

@@ -39,6 +39,7 @@ def program_of(model: SoftModel, *, weight: bool = False) -> Program:
 # --- The text
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("kind", "weight"), [("arm", False), ("arm", True), ("pcc", False), ("pcc_lumped", True)])
 def test_generated_text_is_in_the_kernel_language(kind: str, weight: bool) -> None:
     """Read, and with every function and place that a caller needs; the statements are read by the translation to C."""
@@ -93,6 +94,7 @@ print(cache_folder())
 """
 
 
+@pytest.mark.study
 def test_the_text_is_the_same_in_every_process(tmp_path: Path) -> None:
     """Also with other hashes of strings, which decide the order of sets; else nothing on disk is found again.
 
@@ -212,6 +214,7 @@ for number in range(60):
 """
 
 
+@pytest.mark.study
 def test_two_processes_write_the_same_files(tmp_path: Path) -> None:
     """Both at once, in the same order: what either imports is whole, and nothing is left lying about."""
     environment = os.environ | {"SOFTROBOTS_CACHE": str(tmp_path / "cache")}
@@ -280,6 +283,7 @@ def cases(rng: np.random.Generator, count: int) -> tuple[np.ndarray, np.ndarray]
     return rng.uniform(-np.pi, np.pi, (count, 3)), forces
 
 
+@pytest.mark.study
 def test_numba_and_python_find_the_same(numba_arm: Any, arm: SoftModel, rng: np.random.Generator) -> None:
     """Single cases and batches of both: polynomials for sine and cosine, and fused products, change the last digits only."""
     python = make_run(program_of(arm), "python")
@@ -296,6 +300,7 @@ def test_numba_and_python_find_the_same(numba_arm: Any, arm: SoftModel, rng: np.
             assert np.abs(alone - found[row]).max() < 1e-9 or not close[row]
 
 
+@pytest.mark.study
 @each_row("direction", [(1.0, 0.5, 0.0), (1.0, 0.0, 0.0), (-1.0, 0.0, 1e-9)])
 @each_row("size", [np.nan, np.inf, 1e154, 1e200, 1e308])
 def test_what_is_no_number_has_a_status(numba_arm: Any, arm: SoftModel, size: float, direction: tuple[float, ...]) -> None:

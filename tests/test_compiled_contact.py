@@ -55,6 +55,7 @@ def test_distances_have_the_slopes_and_bends_of_those_of_the_environment(obstacl
         assert found[0] < 0.0 or np.abs(found[4:13].reshape(3, 3) - (ahead - behind) / 2e-6).max() < 1e-6
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("scene", SCENES)
 def test_equilibria_are_those_of_the_plain_solver(arm: sr.SoftModel, scene: str) -> None:
     """The same balance by other equations, both to 1e-10 of the load: springs to 1e-9, forces to 1e-9 of the load."""

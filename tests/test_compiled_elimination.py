@@ -379,6 +379,7 @@ def test_the_step_of_an_arm_of_three_links_that_differ(
     compare_with_pinocchio(odd_arm, gravity, rng, size=100.0)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["arm", "odd", "odd_arm"])
 def test_loops_compute_what_the_straight_line_does(
     kind: str, odd_arm: SoftModel, monkeypatch: pytest.MonkeyPatch, rng: np.random.Generator
@@ -408,6 +409,7 @@ def test_loops_compute_what_the_straight_line_does(
             assert np.allclose(answers[0], answers[1], rtol=0.0, atol=1e-11)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("kind", "locked"),
     [

@@ -59,6 +59,7 @@ def forces_of(rng: np.random.Generator, count: int, largest: float) -> np.ndarra
     return np.asarray(forces * rng.uniform(0.02, 1.0, (count, 1)) * largest / np.linalg.norm(forces, axis=1)[:, None])
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, GRAVITY], ids=["weightless", "heavy"])
 @pytest.mark.parametrize("name", ROBOTS)
 def test_long_chains_equal_the_pinocchio_path(name: str, gravity: Any, rng: np.random.Generator) -> None:
@@ -78,6 +79,7 @@ def test_long_chains_equal_the_pinocchio_path(name: str, gravity: Any, rng: np.r
         assert np.linalg.norm(single.tip_position - found.tip_positions[row]) < 1e-9
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["sections", "sections_forces", "arm_and_sections"])
 def test_no_failure_touches_another(name: str, rng: np.random.Generator) -> None:
     solver = compiled(name)
@@ -150,6 +152,7 @@ def rod(count: int, chain: str, locked: tuple[str, ...] = (), stiff: float = 1.0
     return sr.compile(sr.load_model(arm, muscles="forces"), backend="python", locked_strains=locked)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("chain", "counts"), [("sections", (13, 52)), ("lumped", (16, 32))])
 def test_convergence_to_the_elastica(chain: str, counts: tuple[int, ...]) -> None:
     """52 sections are 312 joints. An inextensible rod in closed form; the error is of second order."""
@@ -179,6 +182,7 @@ def test_convergence_to_a_rod_in_space() -> None:
     assert 3.5 < errors[0] / errors[1] < 4.5  # second order
 
 
+@pytest.mark.study
 def test_locked_strains_are_the_limit_of_stiff_ones() -> None:
     """Twist and stretch a million times as stiff move a millionth as much."""
     bending, stiff, soft = rod(15, "sections", ("twist", "stretch")), rod(15, "sections", stiff=1e6), rod(15, "sections")

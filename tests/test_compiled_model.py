@@ -83,6 +83,7 @@ def assert_clean(batch: Any) -> None:
 # --- Equilibria
 
 
+@pytest.mark.study
 def test_ten_thousand_random_cases_equal_the_pinocchio_path(solver: CompiledModel, rng: np.random.Generator) -> None:
     """Every case at 18 N, from rest on both sides: 1e-10 relative. Pinocchio's path is asked for 1e-13."""
     motors, forces = cases(rng, 10_000, 18.0, 18.0)
@@ -105,6 +106,7 @@ def test_both_back_ends_agree(plain: CompiledModel, fast: CompiledModel, rng: np
     assert np.median(apart(one.q_springs, other.q_springs)) < 1e-14
 
 
+@pytest.mark.study
 def test_every_one_of_1e5_hard_cases_is_certified_and_rightly_so(solver: CompiledModel, rng: np.random.Generator) -> None:
     """1-200 N: residual and smallest eigenvalue of the tangent, both from the DH table; fewer without numba."""
     count = 100_000 if solver.backend == "numba" else 2_000
@@ -154,6 +156,7 @@ def test_scipy_finds_the_same_minimum(plain: CompiledModel, rng: np.random.Gener
         assert np.allclose(plain.equilibrium(q, f).q_springs, lowest.x, rtol=0.0, atol=2e-6)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [GRAVITY, np.array([3.0, -2.0, 7.0])])
 def test_gravity(solver: CompiledModel, gravity: np.ndarray, rng: np.random.Generator) -> None:
     motors, forces = cases(rng, 200, 0.0, 60.0)
@@ -176,6 +179,7 @@ def test_no_gravity_is_gravity_of_zero(plain: CompiledModel, rng: np.random.Gene
     assert np.max(apart(heavy.q_springs, light.q_springs)) < 1e-10
 
 
+@pytest.mark.study
 def test_robots_with_odd_links_and_any_number_of_motors(
     odd_arm: sr.SoftModel, one_link: CompiledModel, three_links: CompiledModel, rng: np.random.Generator
 ) -> None:
@@ -313,6 +317,7 @@ def assert_explains(compiled: CompiledModel, motors: np.ndarray, torques: np.nda
     assert np.allclose(checked.motor_torques, torques[row], rtol=0.0, atol=1e-8)
 
 
+@pytest.mark.study
 def test_estimates_are_the_true_force(solver: CompiledModel, rng: np.random.Generator) -> None:
     """To 1e-8 where every direction is well felt; elsewhere another force may explain the torques, too."""
     motors, forces = cases(rng, 400, 1.0, 30.0)
@@ -445,6 +450,7 @@ def assert_arrived(compiled: CompiledModel, found: Any, targets: np.ndarray, for
         assert np.all((found.q_motors[row] >= limits[:, 0] - 1e-9) & (found.q_motors[row] <= limits[:, 1] + 1e-9))
 
 
+@pytest.mark.study
 def test_targets_made_by_equilibria_are_reached(solver: CompiledModel, rng: np.random.Generator) -> None:
     motors, forces = cases(rng, 300, 1.0, 30.0)
     motors *= 0.8
@@ -592,6 +598,7 @@ def test_a_path_beyond_the_limits_of_a_motor() -> None:
     assert set(found.counts()) <= {Status.CERTIFIED, Status.NOT_REACHED, Status.BEYOND_LIMITS}
 
 
+@pytest.mark.study
 def test_a_first_waypoint_out_of_reach(solver: CompiledModel) -> None:
     for start in (None, (0.1, 0.2, 0.3)):
         with pytest.raises(sr.TargetUnreachable) as caught:

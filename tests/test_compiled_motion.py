@@ -146,6 +146,7 @@ def test_same_answer_as_simulate_at_the_same_steps(case: str, arm: SoftModel, so
     np.testing.assert_allclose(found.velocities, expected.velocities, rtol=0, atol=1e-8)
 
 
+@pytest.mark.study
 def test_the_tolerance_is_kept(solver: CompiledModel, monkeypatch: pytest.MonkeyPatch) -> None:
     given = {"gravity": GRAVITY, "damping_time": 1e-3, "force": (0.0, 4.0, -3.0), "output_step": 5e-3}
     found = solver.simulate(0.2, swaying, tolerance=1e-4, **given)

@@ -71,6 +71,7 @@ def close(found: Any, expected: Any, steps: int, h: float) -> None:
     np.testing.assert_allclose(found.velocities, expected.velocities, rtol=0, atol=left)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("name", "order"), [(name, 4 if place % 2 else 2) for place, name in enumerate(ARMS)])
 def test_a_released_robot_moves_as_simulate_says(name: str, order: int, rng: np.random.Generator) -> None:
     """From relaxed springs, under its weight, a force and inputs that differ from those at rest, damped by the file or not."""
@@ -98,6 +99,7 @@ def test_tendons_go_slack_and_taut_again() -> None:
     close(found, expected, steps, h)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["tendons", "lengths", "winding lengths"])
 def test_inputs_may_move(name: str, rng: np.random.Generator) -> None:
     """Motors of tendons, lengths and motor joints that swing, one robot by itself and two side by side."""
@@ -116,6 +118,7 @@ def test_inputs_may_move(name: str, rng: np.random.Generator) -> None:
     assert np.abs(batch.tip_position[1] - batch.tip_position[0]).max() > 1e-5
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("order", [2, 4])
 @pytest.mark.parametrize("name", ["tendons", "winding", "lengths", "winding lengths", "lumped winding", "lumped coils"])
 def test_a_step_solves_the_equations_of_motion(name: str, order: int, rng: np.random.Generator) -> None:

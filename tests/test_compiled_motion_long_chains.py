@@ -77,6 +77,7 @@ def started(
     return w, path, damping, state | given
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", list(LONG))
 def test_a_step_of_a_long_chain_is_the_implicit_midpoint_rule(kind: str, rng: np.random.Generator) -> None:
     model = LONG[kind]()
@@ -167,6 +168,7 @@ def test_locked_strains_stay_at_rest(rng: np.random.Generator) -> None:
     np.testing.assert_allclose(ends[0], ends[1], rtol=0, atol=1e-6)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["rod", "tensions"])
 def test_a_batch_has_the_motions_of_its_cases(kind: str, rng: np.random.Generator) -> None:
     model = LONG[kind]()

@@ -74,6 +74,7 @@ def nearby(model: sr.SoftModel, motors: np.ndarray, rng: np.random.Generator, si
 # --- How the tip follows
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("name", "gravity"), EITHER)
 def test_jacobian_and_loads_are_those_of_the_pinocchio_path(name: str, gravity: Any, rng: np.random.Generator) -> None:
     """The same equilibrium on both sides: 1e-9 relative leaves room for the condition of the tangent stiffness."""
@@ -91,6 +92,7 @@ def test_jacobian_and_loads_are_those_of_the_pinocchio_path(name: str, gravity: 
             assert np.abs(loads - at.motor_torques).max() <= 1e-9 * np.abs(at.motor_torques).max()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("locked", [("twist",), ("twist", "stretch")])
 @pytest.mark.parametrize("name", ["tensions", "on_an_arm", "tube_on_an_arm"])
 def test_locked_strains_stay_where_they_are(name: str, locked: tuple[str, ...], rng: np.random.Generator) -> None:
@@ -129,6 +131,7 @@ def test_locking_all_strains_of_sections_is_refused() -> None:
 # --- Load estimation
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, GRAVITY])
 @pytest.mark.parametrize("name", FEELING)
 def test_a_force_that_made_the_torques_is_found(name: str, gravity: Any, rng: np.random.Generator) -> None:
@@ -207,6 +210,7 @@ def test_bad_input_of_an_estimate() -> None:
 # --- Inverse kinematics
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("name", "gravity"), EITHER)
 def test_searches_end_where_the_pinocchio_path_ends(name: str, gravity: Any, rng: np.random.Generator) -> None:
     """One search on two engines: the same motors, to what a redundant robot leaves on its way home (1e-6 of a radian)."""
@@ -273,6 +277,7 @@ def test_a_start_chooses_the_springs(rng: np.random.Generator) -> None:
 # --- Paths
 
 
+@pytest.mark.study
 def test_a_waypoint_out_of_reach_marks_only_itself(rng: np.random.Generator) -> None:
     model, c = robot("sections"), solver("sections")
     motors, force = drawn(model, rng)

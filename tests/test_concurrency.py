@@ -82,6 +82,7 @@ def at_once(job: Callable[[], Any], count: int = THREADS) -> list[Any]:
         return list(pool.map(run, range(count)))
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("racing")
 def test_eight_threads_share_models(mix: tuple[Any, ...], alone: list[bytes]) -> None:
     assert in_threads(solver_mix.jobs(*mix)) == alone
@@ -125,6 +126,7 @@ def _in_process(sent: bytes | None) -> list[bytes]:
         return list(pool.map(solver_mix.as_bytes, solver_mix.jobs(*robots)))
 
 
+@pytest.mark.study
 def test_two_processes_give_the_same_bytes(mix: tuple[Any, ...], alone: list[bytes]) -> None:
     """This one and another, in which models came over or are loaded."""
     with ProcessPoolExecutor(1, mp_context=multiprocessing.get_context("spawn")) as pool:
@@ -132,6 +134,7 @@ def test_two_processes_give_the_same_bytes(mix: tuple[Any, ...], alone: list[byt
         assert [future.result() for future in found] == [alone, alone]
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("racing")
 def test_robots_are_described_and_loaded_at_the_same_time(mix: tuple[Any, ...]) -> None:
     """Xacro keeps its state in module globals; nothing of one robot may get into another."""
@@ -161,6 +164,7 @@ def test_threads_that_compile_the_same_robot_share_what_is_made(
     assert sys.modules[file.stem].settle is compiled[0]._settle
 
 
+@pytest.mark.study
 def test_a_compiled_model_survives_pickling() -> None:
     muscles = sr.load_model(sr.PccArm(elastic_sections=2), muscles="forces")
     fast = sr.compile(muscles, backend="python", locked_strains=("twist", "stretch"))

@@ -144,6 +144,7 @@ def test_pose_of_an_arc_is_exact(bending: float, frame: str, azimuth: float) -> 
     assert worst_error(cc.transform(Arc(0.5, bending, azimuth), frame), exact) < 1e-12
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("bending", BENDINGS + COILS)
 @pytest.mark.parametrize("frame", FRAMES)
 def test_derivatives_by_arc_are_exact(bending: float, frame: str) -> None:
@@ -151,6 +152,7 @@ def test_derivatives_by_arc_are_exact(bending: float, frame: str) -> None:
     assert worst_error(cc.arc_jacobian(Arc(0.5, bending, 0.7), frame), exact) < 1e-12
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("bending", BENDINGS + COILS)
 def test_pose_and_derivatives_by_strains_are_exact(bending: float) -> None:
     """Twist included: the Jacobian has its column although an arc has none."""
@@ -162,6 +164,7 @@ def test_pose_and_derivatives_by_strains_are_exact(bending: float) -> None:
     assert worst_error(cc.strain_jacobian(strains), exact_jacobian(exact_screw, strains), half_turn) < 1e-12
 
 
+@pytest.mark.study
 @each_row(("frame", "bending"), FRAMES_AND_BENDINGS)
 @each_row("azimuths", [cc.AZIMUTHS, UNEVEN, FIVE])
 def test_pose_and_derivatives_by_muscles_are_exact(frame: str, bending: float, azimuths: tuple[float, ...]) -> None:
@@ -310,6 +313,7 @@ def test_muscles_are_as_long_as_the_curves_beside_the_backbone(azimuths: tuple[f
         assert length == pytest.approx(arc, rel=1e-13)  # the integrand is constant: quadrature adds rounding only
 
 
+@pytest.mark.study
 @law("constant_curvature.muscles_from_arc", "constant_curvature.arc_from_muscles")
 @given(lengths_, st.floats(0.0, 1.0), angles_, st.floats(0.005, 0.04), st.sampled_from([cc.AZIMUTHS, UNEVEN, FIVE]))
 def test_muscles_and_arc_are_inverse(
@@ -367,6 +371,7 @@ def test_turning_the_azimuth_turns_the_arc(length: float, theta: float, alpha: f
     assert np.allclose(cc.transform(turned), rotation @ cc.transform(straight_on) @ rotation.T, **tolerance)
 
 
+@pytest.mark.study
 @law("constant_curvature.chain_transform", "constant_curvature.transform")
 @given(lengths_, bendings_, angles_, st.floats(0.0, 1.0))
 def test_parts_of_an_arc_make_the_arc(length: float, theta: float, alpha: float, part: float) -> None:
@@ -434,6 +439,7 @@ def test_chains_and_their_derivatives_are_exact(count: int, frame: str) -> None:
     assert worst_error(cc.chain_arc_jacobian(arcs, offsets, frame), exact_jacobian(pose, at), scale=True) < 1e-12
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("frame", "bending"), FRAMES_AND_BENDINGS)
 def test_derivatives_of_a_chain_by_muscles_are_exact(frame: str, bending: float) -> None:
     """The paper's arm, with another muscle distance in each segment."""
@@ -510,6 +516,7 @@ def test_arcs_are_frozen() -> None:
     assert pickle.loads(pickle.dumps(arc)).length.tolist() == [0.5, 0.6]
 
 
+@pytest.mark.study
 @pytest.mark.filterwarnings("ignore::softrobots.SuspiciousInputWarning")  # sizes of any kind are meant
 @law("constant_curvature.arc_from_muscles", "constant_curvature.arc_jacobian", "constant_curvature.muscle_jacobian")
 @settings(max_examples=200)
@@ -706,6 +713,7 @@ def test_a_straight_segment_without_a_bending_plane_is_told_with_all_lengths() -
     assert "use 'torsion_free'" in caught.value.requirement
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("azimuths", [cc.AZIMUTHS, (0.1, 1.2, 2.9, -2.2)])
 def test_a_million_arcs_take_less_than_half_a_second(azimuths: tuple[float, ...]) -> None:
     """CPU time, the better of two; and arcs come back as the muscles that were made from them, to 1e-12."""

@@ -72,6 +72,7 @@ def elastica(thrust: float, plate: float) -> tuple[float, float]:
     return float(found.p[0]), float(found.y[1, -1])
 
 
+@pytest.mark.study
 def test_an_elastica_between_two_plates_presses_its_end_on_one() -> None:
     """Thrust beyond Euler's load squeezes a clamped beam between plates: its end touches one, at the reaction of the elastica.
 

@@ -54,6 +54,7 @@ def fourth_order(function: Callable, at: np.ndarray, step: float) -> np.ndarray:
     return np.stack(columns, axis=-1)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", CASES)
 def test_derivatives_in_contact_are_those_of_solved_equilibria(name: str) -> None:
     """Tip and contact forces by motors and by a force at the tip, to 1e-7: steps of 1e-3 rad leave 5e-9 beside the sphere."""
@@ -424,6 +425,7 @@ def test_a_robot_that_has_no_room_is_told_what_is_inside_of_what() -> None:
         sr.solve_ik(arm, (0.9, 0.1, 0.3), environment=slit, starts=2)
 
 
+@pytest.mark.study
 def test_what_cannot_take_obstacles_or_friction_says_so(tmp_path: Path) -> None:
     found = leaning("wall")
     felt = sr.estimate_load(found.model, MOTORS, found.motor_torques, environment=found.environment, gravity=sr.EARTH_GRAVITY)

@@ -324,6 +324,7 @@ def test_a_start_deep_inside_finds_its_way_out(one_link: sr.SoftModel) -> None:
 spheres = st.tuples(st.floats(0.05, 0.3), st.floats(0.3, 1.0), directions, st.floats(-0.3, 0.6))
 
 
+@pytest.mark.study
 @settings(max_examples=25, deadline=None)
 @given(
     kind=st.sampled_from(["arm", "limp", "slack", "two_hinges", "pulled", "tendons", "helix", "helix_lumped"]),
@@ -414,6 +415,7 @@ def test_a_slab_is_a_floor_for_a_robot_that_stands_on_it(force: tuple) -> None:
     assert on_slab.tip_position == pytest.approx(on_floor.tip_position, abs=1e-8)  # both to 1e-10 of the load
 
 
+@pytest.mark.study
 def test_a_start_inside_of_an_obstacle_without_a_near_way_out_is_bent_aside() -> None:
     """The relaxed robot runs through the middle of three obstacles; the energy is that of the equilibrium with them."""
     random = contact_running.family_of("arm")

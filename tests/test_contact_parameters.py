@@ -73,6 +73,7 @@ def require_differences(at: Sensitivity, step: float = 1e-4) -> None:
         assert np.abs(exact[:, place] - slopes).max() < 1e-7 * np.abs(slopes).max(), name
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("around", AROUND.values(), ids=AROUND)
 def test_derivatives_in_contact_are_those_of_solved_equilibria(around: Environment) -> None:
     arm = sr.load_model(sr.InflatableArm())
@@ -95,6 +96,7 @@ def test_motors_are_those_of_the_elastostatic_jacobian() -> None:
     assert at.normal_forces == pytest.approx(np.hstack([contact.by_motors, contact.by_wrench[:, :3]]), rel=1e-9, abs=1e-12)
 
 
+@pytest.mark.study
 def test_a_rod_of_sections_with_muscles_leans_on_a_wall() -> None:
     """Elastic coordinates that are no joints, and actuators along the body."""
     arm = sr.load_model(sr.PccArm(elastic_sections=4), muscles="forces")
@@ -106,6 +108,7 @@ def test_a_rod_of_sections_with_muscles_leans_on_a_wall() -> None:
     require_differences(sr.sensitivity(arm, found, ("segment_lengths[1]", "radius", "motor[1]", "force")))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["gravity.x", "segment_lengths"])
 def test_a_prop_carries_more_of_a_heavier_and_of_a_longer_beam(name: str) -> None:
     r"""`R = w (6 L^2 - 4 L a + a^2) / (8 a)` for a prop at `a`, `3 w L / 8` at the end, and its derivatives by `w` and `L`.

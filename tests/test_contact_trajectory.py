@@ -22,6 +22,7 @@ WALL = sr.Environment([sr.HalfSpace((-1, 0, 0), offset=-1.0, name="wall")])
 WEIGHT = np.array([0.0, 0.0, -20.0])
 
 
+@pytest.mark.study
 @law("follow_trajectory")
 @settings(max_examples=6)
 @given(
@@ -65,6 +66,7 @@ def along_the_wall(start: sr.Equilibrium, heights: np.ndarray, friction: float) 
     return sr.follow_trajectory(start.model, targets, WEIGHT, environment=WALL, friction=friction, q_motors0=start.q_motors)
 
 
+@pytest.mark.study
 def test_an_arm_is_dragged_down_and_up_a_wall(start: sr.Equilibrium, tmp_path: Path) -> None:
     """Work of load and motors becomes elastic energy and work of friction; the motors drive the robot along the same way."""
     heights = np.concatenate([np.linspace(0.0, 0.02, 5), np.linspace(0.02, 0.0, 5)[1:]])
@@ -102,6 +104,7 @@ def test_an_arm_is_dragged_down_and_up_a_wall(start: sr.Equilibrium, tmp_path: P
     assert "work of friction" in str(again)
 
 
+@pytest.mark.study
 def test_little_friction_is_nearly_none(start: sr.Equilibrium) -> None:
     """With friction of 1e-9 the motors are those of the path without; beside it a row of steps drifts by their length."""
     targets = np.linspace(0.0, 0.01, 9)

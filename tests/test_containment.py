@@ -99,6 +99,7 @@ def test_names_stay_names_in_every_export(name: str) -> None:
         assert [value for value in constants if isinstance(value, str) and f"{name}j" in value]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", NAMES)
 def test_names_are_no_code_where_code_is_generated(name: str) -> None:
     """A joint whose name ended the docstring of the generated module once ran whatever came behind it."""
@@ -122,6 +123,7 @@ def files_below(folder: Path) -> set[str]:
     return {str(path.relative_to(folder)) for path in folder.rglob("*") if not path.is_dir()}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["../../outside", "/tmp/softrobots_outside"])
 def test_files_are_written_where_the_caller_says(name: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever the robot is called: there are the files that were asked for, and no other."""
@@ -156,6 +158,7 @@ def test_names_are_one_cell_of_a_table(name: str, tmp_path: Path) -> None:
     assert sr.load_result(sr.save_result(path, tmp_path / "a.npz")).model.motor_joints == (f"{name}j",)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["$\\frac{$", "$", "a$b$c\\", "a\nb", SCRIPT])
 def test_names_are_no_formulas_in_figures(name: str, tool: Callable[[str], Any]) -> None:
     tool("matplotlib")
@@ -189,6 +192,7 @@ def hostile() -> Iterator[Viewer]:
         yield viewer
 
 
+@pytest.mark.study
 def test_names_add_nothing_to_a_page(hostile: Viewer) -> None:
     plain = robot("plain")
     with view(plain, sr.solve_equilibrium(plain, (0.3,), (1.0, 2.0, -3.0))) as viewer:
@@ -277,6 +281,7 @@ def test_servers_listen_on_loopback_only(server: str, servers: dict[str, tuple[i
         socket.create_connection(("127.0.0.2", port), timeout=5)  # an address of this machine, too, but another one
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("server", ["meshcat", "sliders"])
 def test_a_second_page_on_the_same_port_does_not_break_the_first(server: str, servers: dict[str, tuple[int, str, int]]) -> None:
     from softrobots.view.slider_page import SliderPage

@@ -65,6 +65,7 @@ def follow(model: sr.SoftModel, start: sr.Equilibrium, torque: Any, **options: A
     return sr.simulate(model, 2.0, None, start=start, motors="torque", torque=torque, time_step=4e-3, **load | options)
 
 
+@pytest.mark.study
 def test_feed_forward_ends_on_target_where_proportional_control_alone_sags(loaded: sr.Trajectory) -> None:
     """What `PD` alone leaves at rest is its torque over its gain: an equilibrium found by the statics."""
     model, kp = loaded.model, 300.0
@@ -114,6 +115,7 @@ def tip_of(model: sr.SoftModel, q: np.ndarray) -> np.ndarray:
     return np.array(data.oMf[model.frame_id(model.tip)].translation)
 
 
+@pytest.mark.study
 def test_the_closed_loop_finds_the_target_under_a_load_that_nobody_told_it(geared: sr.SoftModel, path: sr.Path3D) -> None:
     """The error at rest goes to zero, and a second run of the same controller repeats the first bit by bit."""
     start = sr.solve_ik(geared, START, FORCE, gravity=sr.EARTH_GRAVITY).equilibrium

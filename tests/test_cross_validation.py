@@ -30,6 +30,7 @@ def measured(seed: int, **more: Any) -> sr.Measurements:
     return sr.Measurements(q_motors, mass=masses, gravity=GRAVITY, tip_position=tips, labels=labels, **more)
 
 
+@pytest.mark.study
 @law("cross_validate", "CrossValidation")
 @given(st.integers(0, 2**32 - 1))
 @settings(max_examples=1, deadline=None)

@@ -68,6 +68,7 @@ RESULTS: dict[str, Callable[[], Any]] = {
 }
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", list(RESULTS))
 def test_a_table_is_the_csv_file_as_pandas_reads_it(tmp_path: Path, tool: Tool, name: str) -> None:
     pandas, result = tool("pandas"), RESULTS[name]()
@@ -103,6 +104,7 @@ def test_columns_have_the_numbers_of_the_result_and_their_units(tool: Tool) -> N
     assert last["spring velocity 2 [rad/s or m/s]"] == moved.velocities[1, -1, 1]
 
 
+@pytest.mark.study
 def test_a_solve_is_one_row_and_what_has_several_has_one_each(tool: Tool) -> None:
     tool("pandas")
     held = RESULTS["equilibrium"]()

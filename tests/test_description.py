@@ -229,6 +229,7 @@ link = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.study
 @law("InflatableArm")
 @given(
     st.lists(link, min_size=1, max_size=6),
@@ -278,6 +279,7 @@ def test_any_valid_arm_obeys_the_rules_of_portable_urdf(links: list[dict], wrist
     assert len(springs) == 2 * len(links)
 
 
+@pytest.mark.study
 def test_many_links_expand() -> None:
     """Recursion by halves: a linear one dies at about 300 links (measured), and costs more than in proportion."""
     model = sr.load_model(sr.InflatableArm(link_lengths=(0.2,) * 90))

@@ -57,6 +57,7 @@ def test_the_bending_of_a_segment_plays_between_two_lines() -> None:
         assert bending(equilibrium) == pytest.approx(np.full(4, curvature), abs=2.02 * STICK / (LENGTH / 4))
 
 
+@pytest.mark.study
 def test_friction_does_not_depend_on_the_rate_nor_on_the_number_of_steps() -> None:
     """Moves in one plane: one step and ten steps to each point of return are alike, but for the stick."""
     model = sr.load_model(one_segment(bending_friction=MOMENT, guide_friction=0.2))
@@ -89,6 +90,7 @@ def capstan(tension: float, coefficient: float, s: np.ndarray) -> np.ndarray:
     return np.log1p(coefficient * tension * DISTANCE * s / EI) / coefficient
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("tension", [2.0, 8.0])
 def test_a_tendon_in_its_guides_follows_the_capstan(tension: float) -> None:
     coefficient, errors = 0.4, []
@@ -116,6 +118,7 @@ def test_a_tendon_that_is_let_go_first_sticks_and_then_slips_back() -> None:
     assert slipped == pytest.approx(float(capstan(2.0, -0.4, np.array(LENGTH))), rel=3e-3)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("fields", [{"bending_friction": MOMENT}, {"guide_friction": 0.3}])
 def test_a_cycle_takes_energy_and_gives_none(fields: dict[str, object]) -> None:
     """Work of a tendon over closed cycles, `sum T dl`: positive, and the same each time; nothing is lost without friction."""
@@ -146,6 +149,7 @@ def test_muscles_of_given_length_have_hysteresis_too() -> None:
     assert further.stable
 
 
+@pytest.mark.study
 def test_a_trajectory_remembers_its_way(tmp_path: Path) -> None:
     """Out and back along a line: other tensions at the same tip, as those of single steps from point to point."""
     model = sr.load_model(sr.TendonArm(kind="tension", bending_friction=MOMENT, elastic_sections=2))
@@ -164,6 +168,7 @@ def test_a_trajectory_remembers_its_way(tmp_path: Path) -> None:
     assert again.q_springs == pytest.approx(direct.q_springs, abs=1e-14)
 
 
+@pytest.mark.study
 def test_a_copy_of_a_result_remembers_what_the_result_does() -> None:
     """A small step back only sticks, so that what is remembered then is of the step before."""
     model = sr.load_model(sr.TendonArm(kind="tension", bending_friction=MOMENT, guide_friction=0.1, elastic_sections=2))
@@ -183,6 +188,7 @@ def test_the_robot_of_a_result_comes_from_rest_unless_a_result_is_given() -> Non
     assert np.abs(fresh.q_springs - back.q_springs).max() > 1e-3
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("moment", "guides"), [(0.1, 0.1), (1e3, 0.0)])
 def test_friction_may_be_large_against_the_load(moment: float, guides: float) -> None:
     """Given lengths without a load: the friction of bending and guides has its own rounding, beyond the least tolerance."""
@@ -226,6 +232,7 @@ def test_a_file_with_negative_friction_is_refused() -> None:
             sr.load_model(text.replace(old, new, 1))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("coefficient", [2.0, 50.0])
 def test_friction_of_given_lengths_that_runs_away_is_no_equilibrium(coefficient: float) -> None:
     """Tensions of given lengths answer to their friction: beyond some coefficient they grow without end, and that is said."""

@@ -230,6 +230,7 @@ def spring_load(case: Case, found: sr.Equilibrium) -> float:
 # --- Geometry and masses
 
 
+@pytest.mark.study
 def test_mjcf_has_the_kinematics_and_the_mass_matrix_of_the_robot(tool: Tool, case: Case) -> None:
     robot = InMujoco(tool("mujoco"), to_mjcf(case.model) if not case.model.muscles else welded_mjcf(case))
     names = list(case.model.pinocchio.names)[1:]

@@ -160,6 +160,7 @@ def test_distances_to_obstacles_are_those_of_mujoco(tool: Tool, rng: np.random.G
     assert pairs > 20
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("itself", [False, True])
 def test_a_robot_touches_itself_where_it_is_folded_and_if_it_is_said(tool: Tool, itself: bool) -> None:
     """Neighbours overlap and never touch; a chain that is bent by 0.28 rad a hinge is a ring whose ends overlap."""

@@ -98,6 +98,7 @@ def assert_sources_lead_to_numbers(robot: XacroRobot) -> int:
     return count
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ROBOTS)
 def test_every_source_leads_to_its_number(name: str) -> None:
     robot = ROBOTS[name]
@@ -118,6 +119,7 @@ def test_sources_of_other_lumped_arms(lengths: list[float], hinges: int, rule: s
     assert_sources_lead_to_numbers(robot)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ROBOTS)
 def test_the_file_and_the_urdf_are_enough_to_load_the_robot(name: str) -> None:
     """The same equilibrium, to the last bit: the numbers are whole."""
@@ -218,6 +220,7 @@ def test_inflated_links() -> None:
 # --- Parameters
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ROBOTS)
 def test_parameters_and_their_sources(name: str) -> None:
     """One a field; a value that would be the same without being given has the source of its default."""

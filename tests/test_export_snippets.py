@@ -115,6 +115,7 @@ def distance(found: dict[str, float], equilibrium: sr.Equilibrium) -> float:
 # --- PyBullet
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("name", "actuators"), [*((name, "driven") for name in CASES), ("arm", "welded"), ("foreign", "welded")]
 )
@@ -133,6 +134,7 @@ def test_pybullet_rests_where_our_statics_says(bullet: ModuleType, name: str, ac
         assert actuators == "welded" or found[motor] == pytest.approx(position, abs=SETTLED)
 
 
+@pytest.mark.study
 def test_the_file_is_enough(bullet: ModuleType, tmp_path: Path) -> None:
     """In another process, an empty folder, without softrobots; and when it is run by itself."""
     motors, force = (0.3, 0.6, -0.8), (0.0, 10.0, -15.0)
@@ -151,6 +153,7 @@ result.update(settle(load(client), {force}))
     assert sorted(path.name for path in (tmp_path / "a").iterdir()) == ["robot.py"]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("time_step", "damping"), [(1 / 60, "critical"), (1 / 500, "critical"), (1 / 240, "file")])
 def test_neither_time_step_nor_damping_moves_the_rest(bullet: ModuleType, time_step: float, damping: str) -> None:
     _, motors, force = CASES["pcc_arm"]
@@ -350,6 +353,7 @@ def test_a_load_without_a_balance_is_an_error() -> None:
 # --- The text
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", CASES)
 @pytest.mark.parametrize("tool_name", ["pybullet", "pinocchio"])
 def test_the_files_are_good_python(tmp_path: Path, tool: Callable[[str], ModuleType], name: str, tool_name: str) -> None:

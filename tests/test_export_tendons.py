@@ -106,6 +106,7 @@ def misses(mujoco: ModuleType, name: str, counts: tuple[int, ...]) -> list[float
     return [float(np.linalg.norm(tip - exact_tip(name))) / length for tip in tips]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["turned", "elastic", "mckibben"])
 def test_the_arm_stands_in_mujoco_where_it_stands_here(tool: Tool, name: str) -> None:
     """Twice as many hinges err by a quarter; with few of them, half of that is left for terms of higher order."""
@@ -268,6 +269,7 @@ def winches(data: Any) -> np.ndarray:
     return np.asarray(data.qpos[-data.model.nu :])
 
 
+@pytest.mark.study
 def test_winches_hold_given_lengths_where_our_statics_says(tool: Tool) -> None:
     """Lengths are met to 1e-4 of some 5 cm, tip and tensions are ours, with an error of second order."""
     mujoco, case = tool("mujoco"), CASES["length"]
@@ -329,6 +331,7 @@ def test_pressures_drive_mckibben_muscles_as_they_do_here(tool: Tool) -> None:
     assert np.abs(data.actuator_force * contraction / ours.muscle_forces - 1.0).max() < 0.01
 
 
+@pytest.mark.study
 def test_what_a_simulator_does_not_have_is_refused_by_name() -> None:
     elastic, helical, mckibben = (CASES[name].load(chain="lumped", hinges=2) for name in ("elastic", "helical", "mckibben"))
     coupled = {"a tension that follows": elastic, "a winding route": helical, "that follows the length": mckibben}

@@ -75,6 +75,7 @@ WRITERS: dict[str, Callable[[sr.Trajectory, Path], object]] = {
 }
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", WRITERS)
 def test_a_full_disk_is_an_error_and_the_old_file_stays(kind: str, path: sr.Trajectory, tmp_path: Path) -> None:
     file = tmp_path / f"result.{kind}"
@@ -171,6 +172,7 @@ def test_every_script_ends_as_the_commands_do() -> None:
 # --- A process that is killed
 
 
+@pytest.mark.study
 def test_a_killed_process_leaves_the_old_file(tmp_path: Path) -> None:
     """Its half of a file is hidden, and in nobody's way."""
     file = tmp_path / "a.txt"

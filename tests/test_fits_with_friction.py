@@ -35,6 +35,7 @@ NAMES = (
 )  # fmt: skip
 
 
+@pytest.mark.study
 def test_derivatives_go_through_what_friction_remembers(rng: np.random.Generator) -> None:
     """Central differences of whole paths; sliders turn within a stick of 1e-4 rad, which steps of 1e-6 see: about 1e-4."""
     arm, measured = wandering(rng, 20, bending_friction=2e-3, rest_bend_y=0.05)
@@ -54,6 +55,7 @@ def test_derivatives_go_through_what_friction_remembers(rng: np.random.Generator
     assert np.any(missed > 0.1 * np.abs(slopes[..., :-1]).max(axis=(0, 1)))  # they are others without friction
 
 
+@pytest.mark.study
 def test_friction_is_fitted_to_rows_in_order(rng: np.random.Generator) -> None:
     """Without noise the moments of friction and the stiffness come back; rows kept aside are predicted where they stand."""
     arm, measured = wandering(rng, 40)
@@ -69,6 +71,7 @@ def test_friction_is_fitted_to_rows_in_order(rng: np.random.Generator) -> None:
     assert np.abs(fit.validation.residuals["positions.tip"]).max() < 2e-5
 
 
+@pytest.mark.study
 def test_a_robot_that_stands_turned_away_is_found(rng: np.random.Generator) -> None:
     """Half a turn from where the fit begins, least squares alone end beside the best."""
     _, measured = wandering(rng, 15, bending_friction=0.0)

@@ -105,6 +105,7 @@ def test_a_ladder_on_two_walls_slips_at_the_pull_of_the_closed_form() -> None:
     assert first == pytest.approx(2.0, abs=0.05)  # radius over length, 1e-5, of a pull that changes by 1e-3, and the last step
 
 
+@pytest.mark.study
 def test_what_friction_wedges_against_the_floor_springs_off_it() -> None:
     """A ball on an inclined rail with mu > tan(angle): past the cone no sliding opposes its friction, only free space is left.
 
@@ -137,6 +138,7 @@ def test_what_friction_wedges_against_the_floor_springs_off_it() -> None:
     assert jump.energy_lost == pytest.approx(0.5 * away @ stiffness @ away, rel=1e-3)
 
 
+@pytest.mark.study
 @settings(max_examples=4)
 @given(angle=st.floats(-0.2, 0.2), ways=st.lists(st.floats(-0.1, 0.1), min_size=2, max_size=4))
 def test_a_floor_that_moves_is_a_base_that_moves_back(angle: float, ways: list[float]) -> None:
@@ -363,6 +365,7 @@ def test_what_is_refused_says_why(case: str) -> None:
         call()
 
 
+@pytest.mark.study
 def test_a_contact_that_sticks_only_in_small_steps_holds_nothing_up(arm: sr.SoftModel) -> None:
     """A tip is pulled down a wall into a second one: a large step tells another status than the small one that ends there."""
     corner = sr.Environment([sr.HalfSpace((-1, 0, 0), -1.0), sr.HalfSpace((0, -1, 0), -0.1)])

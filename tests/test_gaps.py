@@ -105,6 +105,7 @@ def second_derivative(gaps: Gaps, forces: np.ndarray) -> np.ndarray:
     return load.derivative(Entries.of(np.arange(nv), np.arange(nv), nv))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", OBSTACLES)
 def test_least_gap_of_each_capsule_is_the_distance_by_minimisation(arm: sr.SoftModel, kind: str) -> None:
     """SciPy's minimisation along the core of a distance function of this test; its own tolerance: 1e-10 m."""
@@ -136,6 +137,7 @@ def test_least_gap_of_each_capsule_is_the_distance_by_minimisation(arm: sr.SoftM
     assert inside > 0 or kind == "half_space"
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", OBSTACLES)
 def test_derivatives_of_gaps_are_slopes_of_gaps_and_of_gradients(arm: sr.SoftModel, kind: str) -> None:
     surroundings = Surroundings(arm, sr.Environment([OBSTACLES[kind]]))
@@ -147,6 +149,7 @@ def test_derivatives_of_gaps_are_slopes_of_gaps_and_of_gradients(arm: sr.SoftMod
 # --- A robot that touches itself
 
 
+@pytest.mark.study
 def test_a_folded_robot_is_as_far_from_itself_as_by_minimisation(arm: sr.SoftModel) -> None:
     """Four links: SciPy's minimum over both cores, to its tolerance; derivatives by differences."""
     robot = sr.load_model(sr.InflatableArm(link_lengths=(0.4,) * 4, stiffness=100.0))
@@ -204,6 +207,7 @@ def test_two_faces_that_meet_at_a_corner_alone_are_a_corner() -> None:
         assert np.allclose(sum(weight * np.outer(a, a) for a, weight in bends), expected, atol=1e-12)
 
 
+@pytest.mark.study
 def test_neighbours_do_not_touch_each_other(arm: sr.SoftModel) -> None:
     """At rest nothing is near contact, though neighbouring capsules overlap; a tube of many sections, too."""
     for robot in (arm, sr.load_model(sr.PccArm()), sr.load_model(sr.HelixTube())):

@@ -113,6 +113,7 @@ def test_a_sphere_is_held_by_friction_alone() -> None:
     assert not sr.is_force_closure([], 1.0)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("count", [7, 14])
 def test_a_box_without_friction_is_held_as_the_hull_of_its_wrenches_says(count: int) -> None:
     """Contacts at random on all six sides; less than seven never do [Somov 1900]."""
@@ -128,6 +129,7 @@ def test_a_box_without_friction_is_held_as_the_hull_of_its_wrenches_says(count: 
     assert set(answers) == {True, False}
 
 
+@pytest.mark.study
 def test_force_closure_is_between_pyramids_in_and_around_the_cones() -> None:
     """Qhull: zero within the hull of inscribed pyramids is sufficient, within that of circumscribed ones necessary. The squeeze
     that is told balances itself, and has the margin that is told."""
@@ -150,6 +152,7 @@ def test_force_closure_is_between_pyramids_in_and_around_the_cones() -> None:
     assert sum(inner == outer for inner, outer in answers) >= 30
 
 
+@pytest.mark.study
 def test_what_is_closed_balances_random_wrenches_and_what_is_not_does_not() -> None:
     """By brute force: a linear program for each wrench; of an open grasp one of a wrench and its opposite fails often."""
     rng = np.random.default_rng(2)
@@ -223,6 +226,7 @@ def test_the_pull_is_between_linear_programs_of_fine_pyramids(limit: float | Non
         assert np.allclose(sr.contact_wrench(moved) + found.force * arm, sr.contact_wrench(contacts), rtol=0.0, atol=1e-12)
 
 
+@pytest.mark.study
 @law("contact_wrench", "is_force_closure", "pull_out_force")
 @settings(max_examples=15)
 @given(st.integers(0, 2**32 - 1), st.integers(2, 5), st.floats(0.01, 100.0), st.floats(0.01, 100.0))
@@ -250,6 +254,7 @@ def test_a_grasp_is_the_same_wherever_it_is_and_in_any_units(seed: int, count: i
     assert more.largest_force >= held.force - 1e-8 * squeeze  # more friction never holds less
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("friction", [1e-6, 1e-3, 30.0])
 def test_bounds_meet_whatever_the_sizes(friction: float) -> None:
     """Contacts in one point, on a line, in a plane; lengths and forces over many decades: within 1e-6 of the squeeze."""

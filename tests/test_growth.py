@@ -50,6 +50,7 @@ def helix_frame(tube: sr.HelixTube, length: float) -> np.ndarray:
     return expm(length * twist)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("handedness", ["right", "left"])
 def test_every_grown_length_ends_on_the_same_helix(handedness: str) -> None:
     tube = sr.HelixTube(elastic_sections=12, length=1.0, handedness=handedness)
@@ -134,6 +135,7 @@ def test_the_helix_is_formed_in_the_last_frame_however_long_the_front(length: fl
     assert last.grown == 1.0
 
 
+@pytest.mark.study
 def test_the_page_says_what_it_shows_after_the_growth(tube: sr.HelixTube, model: sr.SoftModel) -> None:
     with view(model) as viewer:
         viewer.animate_growth(tube, duration=0.2)
@@ -146,6 +148,7 @@ def test_the_page_says_what_it_shows_after_the_growth(tube: sr.HelixTube, model:
         assert "wrinkling moment left" not in viewer.html()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("chain", ["sections", "lumped"])
 @pytest.mark.parametrize("names", ["{0}_bend_y {0}_bend_x", "{0}_twist"])
 def test_the_viewer_colours_a_section_whatever_its_group_names(chain: str, names: str) -> None:
@@ -156,6 +159,7 @@ def test_the_viewer_colours_a_section_whatever_its_group_names(chain: str, names
     assert {shape.inflated_link for shape in shapes if shape.name.startswith("section_1_")} >= set(range(6))
 
 
+@pytest.mark.study
 def test_the_page_says_what_grows(tmp_path: Path) -> None:
     """That it grows is seen in tests/test_pages.py."""
     tube = sr.HelixTube(elastic_sections=6, length=0.6)
@@ -167,6 +171,7 @@ def test_the_page_says_what_grows(tmp_path: Path) -> None:
     assert "wrinkling" not in re.sub(r"<script.*?</script>", "", text, flags=re.DOTALL)  # nothing is loaded
 
 
+@pytest.mark.study
 def test_growth_is_shown_of_the_tube_of_the_model_only(tube: sr.HelixTube, model: sr.SoftModel) -> None:
     with view(model) as viewer:
         for wrong in (tube.grown(0.5), sr.PccArm(), None):
@@ -205,6 +210,7 @@ def test_actuator_line_runs_along_the_inner_path(tube: sr.HelixTube, model: sr.S
     assert length == pytest.approx(tube.centre_length * abs(inner) / abs(centre), rel=3e-4)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("chain", ["sections", "lumped"])
 def test_a_distributed_force_is_shared_out(chain: str) -> None:
     tube = sr.HelixTube(chain=chain, elastic_sections=10, hinges=10)

@@ -261,6 +261,7 @@ def test_the_simple_rule_allows_a_little_too_much_until_the_fold() -> None:
     )  # it knows nothing of it
 
 
+@pytest.mark.study
 @law("helix.self_contact", "helix.contraction_limit")
 @given(st.floats(0.02, 0.99), st.floats(0.001, 1.56), st.floats(1e-3, 1e3))
 def test_contact_scales_with_the_diameter(contraction: float, angle: float, factor: float) -> None:

@@ -193,6 +193,7 @@ CASES: list[tuple[str, float, float, float, dict[str, Any]]] = [
 ]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("purpose", "radius", "rise", "turns", "limits"), CASES)
 def test_the_nearest_helix_is_on_the_border_and_no_realisable_one_is_nearer(
     purpose: str, radius: float, rise: float, turns: float, limits: dict[str, Any], rng: np.random.Generator
@@ -242,6 +243,7 @@ def test_the_nearest_one_is_nearest_along_the_border_too(side: float):
     assert float(design.contact.turn_clearance) == pytest.approx(0.0, abs=1e-12 * D)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("radius", "rise"), [(0.060, 0.080), (0.090, 0.600)])
 def test_with_one_contraction_the_nearest_is_the_best_angle(radius: float, rise: float):
     design = helix.design_antenna(

@@ -48,6 +48,7 @@ def error(found: sr.Equilibrium, sign: int = 1, contraction: float = CONTRACTION
 SECTIONS = tuple(f"section_1_{number}" for number in range(1, 51))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "fields",
     [
@@ -106,6 +107,7 @@ def test_a_chain_along_the_centre_line_tends_to_another_helix() -> None:
     assert np.linalg.norm(found.tip_position - closed) > 0.07 * length
 
 
+@pytest.mark.study
 def test_under_pressure_the_tension_tends_to_the_closed_form_at_first_order() -> None:
     """T = P dV/dLa plus what the wall resists, in proportion to EI; the shape is (12) but for the strain of the wall, 1e-6."""
     zeta = CONTRACTION * np.exp(2j * ANGLE)
@@ -130,6 +132,7 @@ def test_pressure_untwists_the_tube_in_proportion_to_the_softness_of_its_wall() 
 # --- The robot at rest, and its picture
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("hand", ["right", "left"])
 def test_at_rest_the_tube_is_straight_beside_the_chain(hand: str) -> None:
     """Body, masses and tip are on the axis of the tube; the chain is the line of the actuator around it."""

@@ -436,6 +436,7 @@ def roll_of_the_actuator(actuator: tuple[float, ...], length: float, handedness:
     return total
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("actuator", [a for a in ACTUATORS if a[2] < 0.2], ids=lambda a: f"{a[0]:.4g}-{a[1] / DEG:.3g}deg")
 @every_hand
 def test_material_twist_is_the_roll_of_the_actuator_less_its_winding(actuator: tuple[float, ...], handedness: str) -> None:

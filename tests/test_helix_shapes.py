@@ -107,6 +107,7 @@ def assert_recovered(contraction: float, angle: float, diameter: float, found: h
         assert_close(back, mp.mpf(number), TOLERANCE * max(change, mp.mpf(number)))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("contraction", CONTRACTIONS)
 def test_inverse_of_forward_is_the_actuator(contraction: float) -> None:
     for angle, diameter in itertools.product(ANGLES, DIAMETERS):
@@ -116,6 +117,7 @@ def test_inverse_of_forward_is_the_actuator(contraction: float) -> None:
             assert float(found.contraction) <= 1.0
 
 
+@pytest.mark.study
 @law("helix.forward", "helix.inverse")
 @settings(max_examples=300)
 @given(contractions_, angles_, diameters_)
@@ -300,6 +302,7 @@ def test_a_helix_is_measured_by_the_arcs_of_its_points(contraction: float, angle
         assert np.allclose(helix.inverse(found), (contraction, angle, diameter), rtol=1e-9, atol=0.0)
 
 
+@pytest.mark.study
 @law("helix.measure")
 @settings(max_examples=200)
 @given(contractions_, angles_, diameters_)
@@ -401,6 +404,7 @@ def test_radius_by_name_of_the_path() -> None:
     assert [float(shape.radius(path)) for path in helix.PATHS] == [0.05, float(shape.centre_radius), 0.08]
 
 
+@pytest.mark.study
 @law(
     "helix.HelixShape",
     "helix.curvature_torsion",
@@ -434,6 +438,7 @@ def test_whatever_shape_is_accepted_gives_finite_numbers(outer: float, inner: fl
     assert np.all(np.isfinite(found))
 
 
+@pytest.mark.study
 @law("helix.actuator_curvature_torsion", "helix.material_twist", "helix.volume", "helix.actuator_tension", "helix.forward")
 @settings(max_examples=400)
 @given(

@@ -91,6 +91,7 @@ def test_the_boundary_value_solve_finds_loves_helix(torsion: float, axial_stiffn
     assert np.allclose(rotation, exact[:3, :3], atol=1e-7)
 
 
+@pytest.mark.study
 def test_castiglianos_compliance_is_that_of_the_boundary_value_solve() -> None:
     """Differences over 1e-3 N and 1e-4 N m; both sides, so quadratic terms cancel: 1e-5 of the largest entry."""
     one = HelixRod(0.4, 12.47, -5.06, 0.05, 0.03, 200.0)
@@ -120,6 +121,7 @@ def test_castiglianos_compliance_along_the_axis_is_the_formula_of_a_helical_spri
 # --- Love's helices
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("handedness", ["right", "left"])
 @pytest.mark.parametrize("factors", [(0.9, 1.3), (1.1, 0.6), (0.95, 0.97)])
 def test_a_wrench_along_its_axis_bends_a_chain_of_sections_into_the_exact_helix(handedness: str, factors: tuple) -> None:
@@ -144,6 +146,7 @@ def test_a_wrench_along_its_axis_bends_a_chain_of_sections_into_the_exact_helix(
     assert np.allclose(segment.poses, along, atol=1e-10, rtol=0)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("rule", ["corrected", "midpoint"])
 def test_a_wrench_along_its_axis_bends_lumped_chains_into_the_helix_in_second_order(rule: str) -> None:
     """The body that is drawn ends where the chain does, to second order too; from 12 hinges on. 1.8: room."""
@@ -205,6 +208,7 @@ def test_compliance_of_sections_is_that_of_piecewise_constant_strain_exactly(han
         assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "fields",
     [{"handedness": "left"}, {"hinge_rule": "midpoint"}, {"torsion": False, "extension": False, "handedness": "left"}],
@@ -221,6 +225,7 @@ def test_compliance_of_hinges_is_that_of_springs_on_the_helix_exactly(fields: di
     assert np.abs(found - expected).max() < 1e-12 * np.abs(expected).max()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("fields", "handedness"),
     [({}, "right"), ({}, "left"), ({"chain": "lumped"}, "right"), ({"chain": "lumped", "hinge_rule": "midpoint"}, "right")],
@@ -286,6 +291,7 @@ def loaded(arm: sr.SoftModel, load: str) -> sr.Equilibrium:
     return sr.solve_equilibrium(arm, (), wrench=wrench, gravity=asked.get("gravity"))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("chain", CHAINS)
 def test_a_loaded_tube_converges_to_the_kirchhoff_rod_in_second_order(chain: str, load: str) -> None:
@@ -323,6 +329,7 @@ def test_a_straight_tube_is_an_ordinary_cantilever() -> None:
 # --- Symmetry
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("chain", CHAINS)
 def test_the_mirrored_load_moves_the_tube_of_the_other_hand_to_the_mirrored_place(chain: str) -> None:
     """Forces and positions change sign along y, moments and rotations (axial vectors) along x and z; to the solver's 1e-13."""
@@ -369,6 +376,7 @@ def test_at_rest_nothing_is_loaded() -> None:
 # --- Another solver
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "parameters",
     [{}, {"torsion": False, "extension": False, "handedness": "left"}, {"hinge_rule": "midpoint", "upright": "axis"}],

@@ -148,6 +148,7 @@ def mean_of_helix(robot: HelixTube) -> np.ndarray:
 # --- Geometry
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("helix", "form", "turned"), CASES)
 def test_every_boundary_of_the_sections_lies_on_the_helix(helix: str, form: str, turned: bool) -> None:
     robot, model = tube(helix, form, turned), model_of(helix, form, turned)
@@ -305,6 +306,7 @@ tubes_ = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.study
 @law("HelixTube", "load_model")
 @given(tubes_, st.floats(0.02, 2.8), st.floats(0.004, 0.05), st.integers(0, 3))
 @settings(max_examples=8, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])
@@ -344,6 +346,7 @@ def test_any_tube_is_on_its_helix_has_its_mass_and_obeys_the_rules_of_portable_u
 # --- Mass
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("count", [1, 5])
 @pytest.mark.parametrize(
     "form",
@@ -364,6 +367,7 @@ def test_a_chain_at_rest_has_the_mass_and_the_centre_of_the_helix(form: dict, co
     assert np.allclose(centre, mean_of_helix(robot), atol=1e-15, rtol=0)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("helix", "form", "turned"), CASES)
 def test_the_centre_of_mass_is_the_mean_of_the_helix(helix: str, form: str, turned: bool) -> None:
     robot = tube(helix, form, turned)
@@ -818,6 +822,7 @@ def test_tubes_that_differ_are_other_models(change: dict) -> None:
 # --- The body
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("helix", "form", "turned"), CASES)
 def test_points_of_the_body_lie_on_the_helix_and_the_actuator_on_the_inner_path(helix: str, form: str, turned: bool) -> None:
     """The body starts at the base whatever the hinges; the inner path is p(s) = (Ri cos s, +- Ri sin s, b s)."""

@@ -73,6 +73,7 @@ def refused(read: Callable[[Path], object], file: Path, message: str = "") -> st
     return str(caught.value)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("reader", data.READERS)
 @settings(max_examples=20)
 @given(seed=st.integers(0, 2**32 - 1))
@@ -807,6 +808,7 @@ def readers_in(text: str) -> bool:
     return bool(names & DOORS) or "rb" in modes or "r" in modes
 
 
+@pytest.mark.study
 def test_every_module_that_reads_files_is_tried() -> None:
     script = load_script("fuzz_readers")
     package, scripts = CHECKOUT / "softrobots", CHECKOUT / "scripts"

@@ -118,6 +118,7 @@ def test_any_numbers_give_finite_numbers_or_an_error(name: str, data: st.DataObj
         answered(call, arguments | {key: data.draw(st.lists(NUMBERS, min_size=1, max_size=4))})
 
 
+@pytest.mark.study
 @pytest.mark.filterwarnings("ignore::softrobots.SuspiciousInputWarning")  # sizes of any kind are meant
 @each_row("name", CALLS)
 def test_anything_else_gives_an_answer_or_an_error(name: str) -> None:

@@ -133,6 +133,7 @@ def test_unusual_file_is_read(name: str, outcomes: dict[str, dict]) -> None:
 # --- Damage at random
 
 
+@pytest.mark.study
 @each_row(
     ("corpus", "read", "damage", "cases"),
     [

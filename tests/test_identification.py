@@ -105,6 +105,7 @@ OWN = {
 }  # fmt: skip
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", OWN)
 def test_a_robot_gives_its_own_parameters_back(name: str) -> None:
     robot, names, true, commanded, forces = OWN[name]
@@ -123,6 +124,7 @@ def test_a_robot_gives_its_own_parameters_back(name: str) -> None:
     assert found.model == chosen.model(found.solution)
 
 
+@pytest.mark.study
 @law("identify", "Identification")
 @settings(max_examples=4)
 @given(
@@ -140,6 +142,7 @@ def test_any_arm_gives_its_own_parameters_back(true: tuple[float, ...], seed: in
     assert found.robot.stiffness == pytest.approx(true[:2], rel=1e-9)
 
 
+@pytest.mark.study
 def test_what_twelve_tips_tell_weakly_comes_back_too() -> None:
     """Masses of caps and fabric under small loads: a valley of the cost that is narrow, 1 to 5000, and bends."""
     names, true = ("link[*].stiffness", "hinge_offset", "cap_mass", "density"), [130.0, 210.0, 0.04, 0.3, 1300.0]
@@ -180,6 +183,7 @@ def test_pulls_are_measured_from_the_relaxed_length_that_is_fitted() -> None:
     np.testing.assert_allclose(sr.identify(TENDON, data, names).solution, true, rtol=1e-9)
 
 
+@pytest.mark.study
 def test_rows_of_a_robot_with_dry_friction_come_in_order() -> None:
     robot = replace(TENDON, bending_friction=4e-3)
     names, true = ("young_modulus", "bending_friction"), [40e9, 6e-3]

@@ -70,6 +70,7 @@ def test_slopes_are_those_of_modes_of_other_robots() -> None:
             np.testing.assert_allclose(slopes[key][..., place][known], slope[known], rtol=0.0, atol=1e-8 * size, err_msg=key)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("noise", [0.0, 1e-3])
 def test_a_round_rod_whose_modes_come_in_pairs(noise: float) -> None:
     """Both of a pair are measured; with noise the pair is apart, and its mean counts."""

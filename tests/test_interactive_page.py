@@ -369,6 +369,7 @@ def test_the_example_of_the_guide_talks_to_the_page_in_its_frame(browser: Any, f
     tab.close()
 
 
+@pytest.mark.study
 def test_pages_are_small_and_the_same_again(arm: sr.SoftModel, tmp_path: Path) -> None:
     file = sr.write_interactive(arm, tmp_path / "arm.html", title="<Arm> & co")
     text = file.read_text(encoding="utf-8")

@@ -17,6 +17,7 @@ FORCE = (0.0, 10.0, -15.0)
 TOLERANCE = 1e-9  # what `solve_ik` promises [m]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])
 @pytest.mark.parametrize("method", METHODS)
 def test_the_loaded_tip_arrives(arm: sr.SoftModel, method: str, gravity: tuple | None, rng: np.random.Generator) -> None:
@@ -91,6 +92,7 @@ def test_motor_limits_hold() -> None:
     assert np.abs(caught.value.best.q_motors).max() <= 1.0
 
 
+@pytest.mark.study
 def test_springs_that_do_not_settle_are_not_an_unreachable_target(arm: sr.SoftModel) -> None:
     """At 200 N the fixed point mostly fails; the error says that it is the springs, and what to use instead."""
     force = (200.0, 0.0, 0.0)

@@ -40,6 +40,7 @@ def test_derivatives_are_differences_in_both_modes(jax: Any, equilibrium: Any) -
     check_grads(jax.jit(of_scaled), (MOTORS, FORCES, scaled), 1, eps=1e-4, atol=1e-6, rtol=1e-6)
 
 
+@pytest.mark.study
 def test_transformations_agree(jax: Any, equilibrium: Any) -> None:
     """A batch by `vmap`, by leading dimensions and row by row; forward and reverse mode."""
     values = equilibrium.values

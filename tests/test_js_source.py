@@ -123,6 +123,7 @@ def test_refusals(text: str, word: str) -> None:
         to_javascript(text, exported=("f",))
 
 
+@pytest.mark.study
 @law("CompiledModel.js_source")
 @given(name=st.sampled_from(["arm", "helix"]), points=st.integers(1, 8))
 @settings(max_examples=3)

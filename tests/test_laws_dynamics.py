@@ -38,6 +38,7 @@ def joint_rates(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray, ra
     return np.asarray((4.0 * one - two) / 3.0)
 
 
+@pytest.mark.study
 @law("vibration_modes", "VibrationModes", "dynamics.vibration.ModeSwing")
 @pytest.mark.parametrize("kind", ROBOTS)
 @given(case=cases(1.0), seed=st.integers(0, 2**32 - 1))

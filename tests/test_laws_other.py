@@ -126,6 +126,7 @@ def test_a_direction_has_length_one_and_no_other_direction(vector: np.ndarray) -
 ERRORS = [name for name in sr.__all__ if name in vars(errors)]
 
 
+@pytest.mark.study
 @law(*ERRORS)
 @settings(max_examples=8)
 @given(st.text())

@@ -32,6 +32,7 @@ def energy(robot: sr.SoftModel, motors: np.ndarray, springs: np.ndarray, force: 
 # --- Energy
 
 
+@pytest.mark.study
 @law("solve_equilibrium")
 @pytest.mark.parametrize("kind", ROBOTS)
 @given(case=cases(10.0))

@@ -165,6 +165,7 @@ def test_a_force_at_a_point_is_a_force_and_its_moment_at_the_link(kind: str, cas
     assert np.allclose(state.load.motors, found.motor_torques, rtol=0.0, atol=1e-13 * max(state.scale, 1.0))
 
 
+@pytest.mark.study
 @law("with_springs")
 @pytest.mark.parametrize(
     "kind", ["arm", "limp", "three_links", "two_hinges", "pcc_lumped", "helix_lumped", "mounted", "foreign"]
@@ -251,6 +252,7 @@ def parts(result: Any) -> Iterator[tuple[str, Any]]:
         yield "", result
 
 
+@pytest.mark.study
 @law("save_result", "load_result", "IkSolution", "ImposedDisplacement", "LoadEstimate", "Trajectory", "Workspace")
 @pytest.mark.parametrize("kind", ["arm", "pcc"])
 @given(case=cases(0.1), seed=st.integers(0, 2**32 - 1))

@@ -175,6 +175,7 @@ def solver(kind: str) -> CompiledModel:
     return sr.compile(model(kind), backend="python")
 
 
+@pytest.mark.study
 @law("compile", "CompiledModel.equilibrium", "CompiledModel.equilibria")
 @pytest.mark.parametrize("kind", COMPILED)
 @given(several=st.lists(cases(0.5, st.just(None)), min_size=2, max_size=2))

@@ -117,6 +117,7 @@ def test_tip_on_the_first_motor_axis_hides_the_sideways_force(arm: sr.SoftModel)
     assert np.allclose(np.abs(estimate.unobservable_direction), np.abs([-np.sin(0.5), np.cos(0.5), 0.0]), atol=1e-12)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("motors", [(0.0, 0.0, 0.0), (0.3, 0.4, 0.05), (0.0, np.pi / 2, 0.0)])
 def test_noisy_torques_near_singular_poses_give_an_answer(arm: sr.SoftModel, motors: tuple) -> None:
     rng = np.random.default_rng(0)
@@ -348,6 +349,7 @@ def test_the_force_is_within_its_errors_in_95_of_100_cases(kind: str, cases: int
     assert coverage(measured_robot(kind), cases, 1) == pytest.approx(0.95, abs=0.01 * np.sqrt(6000 / cases))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("kind", "change"), [("length", -0.004), ("elastic", -0.004), ("mckibben", 5e4)])
 def test_errors_of_what_is_given_to_muscles_are_those_of_differences(
     kind: str, change: float, rng: np.random.Generator

@@ -148,6 +148,7 @@ def carried() -> sr.SoftModel:
     return sr.load_model(sr.mount(ur5, "tool0", arm))
 
 
+@pytest.mark.study
 def test_a_ur5_is_drawn_whole_without_warnings(carried: sr.SoftModel) -> None:
     """The surface of its meshes is that of the files, and the rigid robot is drawn beside it only where springs move it."""
     scene = RobotShapes(carried)

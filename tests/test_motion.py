@@ -204,6 +204,7 @@ def test_steps_end_at_the_knee_of_a_plateau() -> None:
     assert nearest.max() < 0.1 * np.diff(moved.steps).max()
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("model", ROBOTS, ids=["arm", "lengths", "tensions", "lumped", "wrist"])
 def test_every_robot_keeps_its_energy_to_second_order(model: sr.SoftModel) -> None:
     start = sr.solve_equilibrium(model, model.relaxed_motors, force=(1.0, 2.0, 0.5))

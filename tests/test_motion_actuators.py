@@ -23,6 +23,7 @@ def arm(kind: str) -> tuple[sr.SoftModel, np.ndarray]:
     return model, inputs
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", INPUTS)
 def test_energy_is_kept_and_held_tendons_do_no_work(kind: str) -> None:
     """Released from a load without damping: 40 steps of the midpoint rule, which keeps energy to second order."""
@@ -40,6 +41,7 @@ def test_energy_is_kept_and_held_tendons_do_no_work(kind: str) -> None:
     assert balances[1] < 0.3 * balances[0] or balances[1] < 1e-7 * energy.kinetic.max()  # rounding
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", INPUTS)
 def test_it_comes_to_rest_in_the_equilibrium(kind: str) -> None:
     model, inputs = arm(kind)

@@ -32,6 +32,7 @@ def test_one_spring_vibrates_as_the_scheme_does_in_closed_form(damping_time: flo
     assert np.abs(moved.energy.balance).max() <= 1e-9 * moved.energy.elastic[0]
 
 
+@pytest.mark.study
 def test_a_double_pendulum_swings_as_dop853_says_to_fourth_order() -> None:
     """And so does its energy; torques are not needed to be, as no motor moves."""
     model, stiffness = pendulum(2, 4.0), 4.0
@@ -52,6 +53,7 @@ def test_a_double_pendulum_swings_as_dop853_says_to_fourth_order() -> None:
         assert len(moved.steps) < 1000  # the midpoint rule takes 12,801 for 1e-6 m
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["arm", "two_hinges", "odd", "rod"])
 def test_compiled_steps_are_those_of_simulate(kind: str) -> None:
     """Single, in a batch and step by step: unrolled chains, and a looped rod of hinges and a slide at one point."""

@@ -33,6 +33,7 @@ def test_motions_are_simulated_saved_and_drawn(tmp_path: Path, capsys: pytest.Ca
     assert released.tip_error <= released.tolerance == pytest.approx(5e-4 * released.model.reach)
 
 
+@pytest.mark.study
 def test_one_short_motion_without_pictures(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     folder = tmp_path / "out"
     words = ["--only", "release", "--duration", "0.05", "--no-plots", "--output", str(folder)]

@@ -76,6 +76,7 @@ def test_any_robot_comes_back_from_its_file(
     assert read_robot(file, "inflatable_arm") == robot
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", sr.ROBOTS)
 @pytest.mark.parametrize("ending", ["yaml", "json"])
 def test_a_robot_comes_back_from_its_file(name: str, ending: str, told, tmp_path: Path) -> None:

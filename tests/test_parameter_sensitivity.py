@@ -27,6 +27,7 @@ def turn_between(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return np.asarray(pin.log3(other @ one.T))
 
 
+@pytest.mark.study
 @law("sensitivity", "Sensitivity")
 @pytest.mark.parametrize("kind", ROBOTS)
 @given(case=cases(0.5), way=st.integers(0, 2**32 - 1))

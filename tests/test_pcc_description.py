@@ -408,6 +408,7 @@ whole_ = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.study
 @law("PccArm", "load_model")
 @given(st.lists(segment_, min_size=1, max_size=3), whole_)
 @settings(max_examples=10, suppress_health_check=[HealthCheck.too_slow, HealthCheck.function_scoped_fixture])

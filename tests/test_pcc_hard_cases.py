@@ -135,6 +135,7 @@ def test_a_robot_of_motors_springs_and_sections_in_one_has_right_derivatives(rng
     assert sr.solve_ik(mixed, found.tip_position, (3, -2, 1), gravity=sr.EARTH_GRAVITY, starts=4).error <= 1e-9
 
 
+@pytest.mark.study
 def test_threads_give_identical_bytes() -> None:
     """Also above the size from which BLAS is kept on one thread."""
     rod = sr.load_model(sr.PccArm(muscle_azimuths=(), elastic_sections=10, segment_lengths=(0.3, 0.3)))

@@ -45,6 +45,7 @@ def angle_between(one: np.ndarray, other: np.ndarray) -> float:
 # Targets that can be reached
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])
 @pytest.mark.parametrize("segments", [1, 2, 3])
 def test_the_loaded_tip_arrives(segments: int, gravity: tuple | None, rng: np.random.Generator) -> None:
@@ -304,6 +305,7 @@ def nearest(
     return min(float(end.fun) for end in ended if not np.isfinite(largest_bending) or spare(end.x).min() > -1e-9)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("target", [(-0.2, 1.2, 0.2), (0.05, 0.02, 0.3), (-0.4, 0.1, 0.2)])
 def test_an_unreachable_target_comes_with_the_nearest_point(target: tuple, rng: np.random.Generator) -> None:
     """Outside the workspace, and in the void around the base that arcs cannot bend into."""
@@ -346,6 +348,7 @@ def test_straight_above_the_nearest_point_is_the_fully_stretched_arm() -> None:
     assert caught.value.best.q_motors == pytest.approx(np.full(6, HIGH), abs=1e-6)
 
 
+@pytest.mark.study
 def test_limits_are_never_exceeded_under_load(rng: np.random.Generator) -> None:
     """Narrow muscles: of targets of a wide arm some are reached and some not, all within the limits, to the last bit."""
     narrow, wide = (model(elastic_sections=2, muscle_contraction=c, muscle_extension=c) for c in (0.04, 0.15))
@@ -389,6 +392,7 @@ def test_a_passive_rod_has_nothing_to_move() -> None:
 # Trajectories
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])
 def test_a_straight_line_is_followed_with_continuous_lengths(gravity: tuple | None) -> None:
     """Every step is that of the loaded Jacobian's pseudo-inverse, the least change, up to second order: 10 % of 12 mm steps."""

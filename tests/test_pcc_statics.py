@@ -283,6 +283,7 @@ def motors_of(rng: np.random.Generator, arm: sr.SoftModel, oracle: Oracle) -> np
     return lengths
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("muscles", "fields"), CASES, ids=NAMES)
 @pytest.mark.parametrize("gravity", [None, (0.5, -1.0, -9.0)])
 def test_residual_is_the_derivative_of_an_energy_written_without_the_package(
@@ -504,6 +505,7 @@ SECTIONS = {"axial_stiffness": 1e9}  # stretches by 1e-8 of the length: nothing 
 HINGES = {"chain": "lumped", "torsion": False, "extension": False}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("force", [2.0, -6.0])
 def test_elastica(force: float) -> None:
     """Passive rods converge to Bisshopp and Drucker's elastica in second order; moving the end hinges lowers the error."""
@@ -565,6 +567,7 @@ def spatial_answers() -> list[tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarr
     return [(tip, middle, *rod_tip(ROD, tip, middle)) for tip, middle in pairs]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", SPATIAL)
 def test_a_rod_in_space_under_forces_and_moments_converges_in_second_order(name: str) -> None:
     """Tip and middle wrench, bending, torsion and stretch against Kirchhoff's equations, bends of up to 90 degrees.
@@ -624,6 +627,7 @@ def test_a_steel_rod_of_50_links_is_right_to_a_tenth_of_a_millimetre() -> None:
 # Buckling
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "fields", [{"axial_stiffness": 1e7}, {"chain": "lumped", "hinge_rule": "midpoint", "extension": False}]
 )
@@ -757,6 +761,7 @@ def test_the_tip_force_comes_back_from_muscle_tensions(rng: np.random.Generator)
             assert len(estimate.unobservable_directions) == 0
 
 
+@pytest.mark.study
 def test_noise_of_the_tensions_spreads_as_the_covariance_says(rng: np.random.Generator) -> None:
     """60 noisy measurements; the scatter of a standard deviation over 60 is 9 %, five times that is allowed."""
     arm, std = model(elastic_sections=2), 0.02

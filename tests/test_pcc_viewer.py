@@ -43,6 +43,7 @@ def test_page_shows_pulling_and_pushing_muscles(browser: object, pcc: sr.SoftMod
     assert min(muscles(shot)) > 300
 
 
+@pytest.mark.study
 def test_viewer_takes_every_kind_of_continuum_arm() -> None:
     for robot, muscles in (
         (sr.PccArm(chain="lumped", hinges=4), "lengths"),

@@ -54,6 +54,7 @@ def check_scales(axes: Any) -> None:
     assert all("[m]" in label for label in (axes.get_xlabel(), axes.get_ylabel(), axes.get_zlabel()))
 
 
+@pytest.mark.study
 @law("plot")
 @settings(max_examples=3)
 @given(st.tuples(ANGLE, ANGLE, ANGLE), PUSH)

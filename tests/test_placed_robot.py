@@ -18,6 +18,7 @@ PLACEMENT = RobotPlacement((0.1, -0.2, 0.3), (0.3, 0.2, 0.5), (Marker("ball", "t
 ROBOTS = {"inflatable_arm": sr.InflatableArm(stiffness=180.0), "pcc_arm": sr.PccArm(segment_lengths=(0.3,), elastic_sections=2)}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ROBOTS)
 def test_a_file_moves_the_robot_and_not_what_is_told_of_it(name: str, tmp_path: Path) -> None:
     """The same equilibrium, seen from elsewhere: loads turned into the axes of the base, the tip and the marker out of them."""
@@ -40,6 +41,7 @@ def test_a_file_moves_the_robot_and_not_what_is_told_of_it(name: str, tmp_path: 
     assert jacobian == pytest.approx(np.cross(turning, arm, axisa=0).T, abs=1e-12)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("marker", "link"), [("ball", "ball"), ("tip", "tip_marker"), ("the ball", "the_ball")])
 def test_a_fit_tells_where_the_robot_stands(marker: str, link: str) -> None:
     """Base and marker of a fit to rows of the placed robot, without noise; a robot whatever the marker is called."""

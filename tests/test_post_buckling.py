@@ -46,6 +46,7 @@ def springs_of(branch: sr.EquilibriumBranch) -> np.ndarray:
     return np.array([one.q_springs for one in branch.equilibria])
 
 
+@pytest.mark.study
 @law("post_buckling_branches", "EquilibriumBranch")
 @given(st.floats(0.0, 3.0), st.floats(-3.1, 3.1), st.floats(-1.5, 1.5), st.floats(1.05, 4.0))
 @settings(max_examples=10)
@@ -115,6 +116,7 @@ def test_two_equal_hinges_have_eight_branches_four_of_them_stable() -> None:
     assert max(last[label] for label in between) < last[FUNDAMENTAL]
 
 
+@pytest.mark.study
 def test_the_arm_of_two_links_on_every_branch_by_the_dh_table(arm: sr.SoftModel) -> None:
     """Balance and stability of every point by [Troise 2021]'s transforms; descent finds one of the branches."""
     stiffness = float(arm.stiffness[0])
@@ -171,6 +173,7 @@ def compare_with_minima(stiffness: np.ndarray, beyond: float, rng: np.random.Gen
     return len(ends)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("difference", [1e-2, 3e-5, 1e-8])
 def test_springs_that_are_nearly_equal_have_all_four_stable_branches(difference: float, rng: np.random.Generator) -> None:
     """Also where the second branches leave the path a little later, unstable, and become stable where they are crossed."""
@@ -225,6 +228,7 @@ def rod() -> sr.SoftModel:
     return sr.load_model(sr.PccArm(segment_lengths=(0.5,), elastic_sections=3, muscle_azimuths=()))
 
 
+@pytest.mark.study
 def test_a_round_rod_buckles_into_a_ring_and_is_said_to_be_neutral(rod: sr.SoftModel) -> None:
     found = by_label(sr.post_buckling_branches(rod, (), (0, 0, -1)))
     assert set(found) == {FUNDAMENTAL, RING}
@@ -283,6 +287,7 @@ def test_at_a_limit_point_the_path_itself_turns_back(arm: sr.SoftModel) -> None:
     assert np.all(path.amplitude == 0.0)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("plateau", [3.0, 12.0])
 def test_a_branch_goes_on_where_the_link_comes_onto_its_plateau(plateau: float) -> None:
     """k a = F L sin a up to the moment M of the plateau, then M = F L sin a: it falls, unstable, to a = pi / 2.
@@ -319,6 +324,7 @@ def check_branches_at_a_plateau(links: int, plateau: float) -> None:
         assert np.linalg.norm(np.diff(springs_of(branch), axis=0), axis=1).max() <= 0.1 / 0.95 + 1e-9  # no jump
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("links", "plateau"), [(1, 25.0), (2, 21.76), (3, 14.99)])
 def test_no_branch_is_lost_at_a_plateau(links: int, plateau: float) -> None:
     check_branches_at_a_plateau(links, plateau)
@@ -371,6 +377,7 @@ def test_a_path_does_not_turn_back_at_a_knee(largest_step: float) -> None:
         assert stiffness[1] * second == pytest.approx(115.0 * LEVER * np.sin(first + second), rel=1e-8)
 
 
+@pytest.mark.study
 def test_two_knees_that_are_nearly_one_are_passed_one_after_the_other() -> None:
     """When the second link comes onto its plateau, the first is 5e-5 rad before its own."""
     model = sr.load_model(sr.InflatableArm(stiffness=(338.4153290, 187.1467356), max_moment=(20.0559514, 13.5996616)))
@@ -379,6 +386,7 @@ def test_two_knees_that_are_nearly_one_are_passed_one_after_the_other() -> None:
     assert {branch.ended for branch in found.values()} == {"largest force"}
 
 
+@pytest.mark.study
 def test_branches_are_found_before_a_plateau_that_begins_early() -> None:
     """At 0.017 rad; they end in balance."""
     model = sr.load_model(sr.InflatableArm(max_moment=3.0))
@@ -400,6 +408,7 @@ def test_a_knee_at_which_stability_is_lost_is_no_crossing() -> None:
     assert not path.stable[top + 1]
 
 
+@pytest.mark.study
 def test_a_branch_tells_why_it_ends(arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch) -> None:
     bent = sr.load_model(sr.PccArm(segment_lengths=(0.5,), elastic_sections=1, muscle_azimuths=()))  # to half a turn at most
     far = by_label(sr.post_buckling_branches(bent, (), (0, 0, -1), max_force=200.0, largest_step=0.2))

@@ -178,6 +178,7 @@ def test_files_that_do_not_hold_what_they_claim_are_refused(results: dict, tmp_p
             sr.load_result(altered(file, bad, **changes))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["equilibrium", "load_estimate", "trajectory"])
 def test_damaged_files_are_refused_or_harmless(results: dict, kind: str, tmp_path: Path) -> None:
     """Bytes flipped at random: an error of ours, or the right answer (the byte was padding)."""
@@ -200,6 +201,7 @@ def test_damaged_files_are_refused_or_harmless(results: dict, kind: str, tmp_pat
     assert "pickle" not in str(caught.value)  # NumPy's advice for such a file
 
 
+@pytest.mark.study
 def test_an_estimate_comes_back_with_its_errors_and_its_alternatives(tmp_path: Path) -> None:
     """The second force, too; one that is none is refused. A file from before without both loads."""
     limp, motors = sr.load_model(sr.InflatableArm(max_moment=12.0)), (0.3, 0.9, -1.4)

@@ -41,6 +41,7 @@ def test_two_modes_of_two_signals_come_back(slow: float, ratio: float, damping: 
     np.testing.assert_allclose(found.amplitudes, 10.0**scale * np.array([[1.0, 0.4], [0.6, 1.0]]), rtol=1e-6)
 
 
+@pytest.mark.study
 def test_intervals_hold_the_true_values() -> None:
     """Two near modes, noise of another size in each signal; of 30 records 120 intervals, and normal numbers squared."""
     frequencies, ratios = (1.3, 1.36), (0.02, 0.03)

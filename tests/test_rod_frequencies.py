@@ -63,6 +63,7 @@ def test_sixteen_hinges_have_three_frequencies_to_a_thousandth(tip: float) -> No
     assert np.abs(errors(STEEL, 16, tip, chain="lumped")).max() < 1e-3
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("chain", [HINGES, {"chain": "flexures"}], ids=["hinges", "flexures"])
 @pytest.mark.parametrize("tip", [0.0, 0.5, 3.0])
 def test_frequencies_of_hinges_and_flexures_are_of_fourth_order(tip: float, chain: dict[str, object]) -> None:

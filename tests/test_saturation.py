@@ -282,6 +282,7 @@ def test_derivatives_of_the_tip_hold_on_the_plateau(limp: sr.SoftModel) -> None:
     assert np.allclose(sr.elastostatic_jacobian(limp, loaded), by_motors, rtol=0.0, atol=1e-7)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("force", [(3.0, 10.0, -15.0), (3.0, 25.0, -30.0)])
 def test_load_estimation_finds_the_force_before_and_on_the_plateau(limp: sr.SoftModel, force: tuple[float, ...]) -> None:
     motors = (0.3, 0.6, -0.9)
@@ -311,6 +312,7 @@ def test_an_oblique_push_collapses_the_link_at_its_knee(one: sr.SoftModel, aside
     assert sr.critical_load(one, (0.0, 0.0), direction) == pytest.approx(expected, rel=1e-8)
 
 
+@pytest.mark.study
 def test_two_links_collapse_where_displacement_control_finds_the_largest_force(limp: sr.SoftModel) -> None:
     """An oblique push of the arm, followed by the displacement of its tip across the push.
 

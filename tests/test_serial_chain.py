@@ -83,6 +83,7 @@ def check_against_pinocchio(model: SoftModel, rng: np.random.Generator, times: i
     assert np.ptp(offsets) <= 1e-12 * max(1.0, total * model.reach)  # [J]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ROBOTS)
 def test_tip_and_energy_are_those_of_pinocchio(kind: str, rng: np.random.Generator) -> None:
     check_against_pinocchio(ROBOTS[kind](), rng)
@@ -108,6 +109,7 @@ KINDS = st.sampled_from(["revolute", "continuous", "prismatic", "fixed"])
 LINKS = st.tuples(KINDS, AXES, st.tuples(*[st.floats(-0.5, 0.5)] * 3), st.tuples(ANGLES, ANGLES, ANGLES))
 
 
+@pytest.mark.study
 @law("SoftModel.chain", "SoftModel.workspace", "load_model")
 @given(st.lists(LINKS, min_size=1, max_size=6), st.sets(st.integers(0, 5)), st.integers(0, 2**31))
 @settings(max_examples=80)

@@ -309,6 +309,7 @@ def test_buckling_is_that_of_the_taut_arm(two_links: sr.SoftModel) -> None:
     assert slack == pytest.approx(taut, rel=1e-12)
 
 
+@pytest.mark.study
 @each_row("rest", [0.02, 0.05, 0.1])
 def test_a_bent_link_gives_way_where_its_wall_has_softened(rest: float) -> None:
     """`F = M(a - rest) / (L sin a)` has a largest value, by quadrature; a linear link has none and never buckles."""
@@ -322,6 +323,7 @@ def test_a_bent_link_gives_way_where_its_wall_has_softened(rest: float) -> None:
         sr.critical_load(linear, (0.0, 0.0), (-1.0, 0.0, 0.0))
 
 
+@pytest.mark.study
 def test_branches_fall_as_the_wall_softens(one_link: sr.SoftModel) -> None:
     """Beyond buckling `F = M(a) / (L sin a)` by quadrature: it falls, and rises when folded."""
     tension = PRESSURE * math.pi * RADIUS**2
@@ -335,6 +337,7 @@ def test_branches_fall_as_the_wall_softens(one_link: sr.SoftModel) -> None:
         assert branch.forces.min() < 45.0
 
 
+@pytest.mark.study
 @each_row(("pressure", "links"), [(5e3, 1), (5e3, 2), (20e3, 3)])
 def test_no_branch_is_lost_where_walls_go_slack_early(pressure: float, links: int) -> None:
     """From 8 mrad on, where a path turns within 1e-7 rad: four planes of the universal joints, both ways, to the end."""
@@ -343,6 +346,7 @@ def test_no_branch_is_lost_where_walls_go_slack_early(pressure: float, links: in
     assert [branch.ended for branch in branches] == ["largest force"] * 9
 
 
+@pytest.mark.study
 def test_motors_and_loads_are_found_again(two_links: sr.SoftModel) -> None:
     """Inverse kinematics and load estimation go through slack walls: the tip is reached, the force found again."""
     force = (0.0, 8.0, -18.0)
@@ -383,6 +387,7 @@ def compiled(request: pytest.FixtureRequest) -> tuple[sr.SoftModel, object]:
     return arm, sr.compile(arm, backend="python")
 
 
+@pytest.mark.study
 def test_compiled_solvers_find_the_same_equilibria(compiled: tuple) -> None:
     """Taut, slack and near collapse, with weight; 1e-9: both are in balance to 1e-10 of the load, the springs may be soft."""
     arm, fast = compiled

@@ -341,6 +341,7 @@ def test_other_shapes_are_refused() -> None:
 # The server
 
 
+@pytest.mark.study
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_the_server_listens_on_loopback_only_says_nothing_and_ends_with_ctrl_c() -> None:
     code = (

@@ -21,6 +21,7 @@ from studies.soak.running import as_json
 from tests.support.scripts import run_script
 
 
+@pytest.mark.study
 def test_a_small_soak_breaks_no_law(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("studies.soak.contact_running.FAMILIES", FAMILIES[:1])
     tallies = soak_contact(40, seed=5)
@@ -56,6 +57,7 @@ def with_contacts(found: Any, **changes: Any) -> Any:
     return SimpleNamespace(contacts=contacts, **{name: getattr(found, name) for name in names})
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("change", "words"),
     [

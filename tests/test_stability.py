@@ -78,6 +78,7 @@ def scan(arm: sr.SoftModel, motors: tuple, direction: np.ndarray, forces: np.nda
     return found
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("tilt", [1e-3, 1e-2, 0.1])
 def test_an_oblique_push_bends_the_arm_and_has_no_limit(arm: sr.SoftModel, tilt: float) -> None:
     """The pitchfork of the straight arm is gone: the arm bends away smoothly, past the load of the straight one."""
@@ -90,6 +91,7 @@ def test_an_oblique_push_bends_the_arm_and_has_no_limit(arm: sr.SoftModel, tilt:
     assert max(np.abs(state.q_springs[[0, 2]]).max() for state in states) < 1e-9  # it stays in its plane
 
 
+@pytest.mark.study
 @each_row("tilt", [1e-4, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8])
 def test_a_nearly_axial_push_bends_the_arm_and_has_no_limit(arm: sr.SoftModel, tilt: float) -> None:
     """However small the tilt, the path bends away beside the crossing and does not go on straight."""

@@ -102,6 +102,7 @@ def test_frequencies_of_the_loaded_arm() -> None:
         assert np.sqrt(found.eigenvalues.real) / (2 * np.pi) == pytest.approx(expected, rel=5e-4)
 
 
+@pytest.mark.study
 def test_a_straight_rod_of_sections_vibrates_as_a_clamped_beam() -> None:
     """(1.8751, 4.6941)^2 sqrt(EI / (rho A L^4)); the mass on chords errs in second order (1.8: room), 8 % at 8."""
     missed = []

@@ -56,6 +56,7 @@ def change(name: str, motors: np.ndarray, wrench: np.ndarray) -> np.ndarray:
     )
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["wall", "sphere", "rod"])
 def test_compliance_and_contact_forces_are_those_of_steps_that_stick(name: str) -> None:
     """Central differences of 1e-4 N and N m; the residual of a step, 1e-10 of the load, over them leaves 1e-6."""

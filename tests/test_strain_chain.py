@@ -104,6 +104,7 @@ def test_stumpff_functions_of_no_number_are_none() -> None:
     assert stumpff(np.zeros((0, 3)), 5).shape == (6, 0, 3)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("highest", range(1, 8))
 def test_stumpff_functions_are_those_of_the_series(highest: int) -> None:
     """Relative to `1/k!`, the value at zero: `c_k = 1/k! - x c_{k+2}` magnifies rounding by x / ((k + 1)(k + 2)) up to x = 40.
@@ -131,6 +132,7 @@ def test_stumpff_functions_at_small_angles_are_exact_to_the_last_places() -> Non
 # --- The screw motion
 
 
+@pytest.mark.study
 @each_row("size", [*SIZES, math.pi, 4.0, 2 * math.pi, 9.0])
 @each_row("unit", [UNIT, (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0), (0.6, 0.0, -0.8)])
 @each_row("stretch", [0.0, STRETCH, -STRETCH])
@@ -228,6 +230,7 @@ def test_many_sections_at_once_are_the_same_as_one_by_one(rng: np.random.Generat
         assert np.allclose(second[place], second_derivative(alone), atol=1e-13, rtol=0)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     ("size", "unit", "stretch"),
     [(size, UNIT, STRETCH) for size in SIZES]

@@ -113,6 +113,7 @@ NAMES = [
 ]
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", NAMES)
 def test_a_result_tells_what_it_holds(name: str) -> None:
     result = every_result()[name]

@@ -143,6 +143,7 @@ def test_the_command_asks_in_one_line_and_refuses_centimetres(capsys: pytest.Cap
     assert main(["pcc", "forward", "50", "53", "55", "54", "51", "52", "--rest", "52", "--distance", "4"]) == 0
 
 
+@pytest.mark.study
 @each_row(
     ("call", "text"),
     [

@@ -49,6 +49,7 @@ def engine(request: pytest.FixtureRequest) -> Callable[[sr.SoftModel], Engine]:
     return pinocchio if request.param == "pinocchio" else compiled(request.param)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])
 def test_the_first_motor_turns_arm_and_load_alike(engine, gravity: object, arm: sr.SoftModel, rng: np.random.Generator) -> None:
     """Motor 1 is vertical, as is gravity."""
@@ -71,6 +72,7 @@ def test_the_mirrored_load_gives_the_mirrored_answer(engine, arm: sr.SoftModel, 
     assert np.abs(tips * (1.0, -1.0, 1.0) - mirrored_tips).max() < SAME
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("factor", [0.01, 7.0, 100.0])
 @pytest.mark.parametrize("engine", [pinocchio, compiled("python")])  # numba would compile each stiffness for some seconds
 def test_stiffness_and_load_scale_together(engine, factor: float, arm: sr.SoftModel, rng: np.random.Generator) -> None:

@@ -61,6 +61,7 @@ def differences(arm: sr.SoftModel, at: sr.Equilibrium, step: float = 1e-5) -> tu
     return np.array(tips).T, np.array(tensions).T
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ROBOTS)
 def test_targets_are_reached_within_all_limits_with_least_tension(name: str, rng: np.random.Generator) -> None:
     """The conditions of Karush, Kuhn and Tucker, with differences of solved equilibria as derivatives.
@@ -92,6 +93,7 @@ def test_targets_are_reached_within_all_limits_with_least_tension(name: str, rng
     assert nnls(normals, -gradient)[1] <= 1e-3 * np.linalg.norm(gradient) + 1e-9
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("seed", [6, 27, 29, 38])
 def test_least_tensions_are_those_of_scipy(seed: int) -> None:
     """SLSQP from beside them; the tip, reached to 1e-9 of 0.12 m, leaves some millionths. Limits stop drifts on the way."""
@@ -118,6 +120,7 @@ def test_least_tensions_are_those_of_scipy(seed: int) -> None:
     assert np.linalg.norm(found) <= (1.0 + 1e-5) * np.linalg.norm(least.x)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["elastic", "tension", "length"])
 def test_poses_and_directions_are_reached_with_nine_tendons(name: str, rng: np.random.Generator) -> None:
     """A pose has six conditions, a direction five: both are met within the limits of all tensions."""
@@ -134,6 +137,7 @@ def test_poses_and_directions_are_reached_with_nine_tendons(name: str, rng: np.r
     assert np.linalg.norm(pose.equilibrium.transform_tip_to_world.rotation - turn) <= 1e-8
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["elastic", "tension"])
 def test_a_closed_path_is_followed_within_all_limits(name: str) -> None:
     """A round of 40 mm about the axis, on which some tendons are just taut."""
@@ -228,6 +232,7 @@ def test_jacobian_and_compliance_are_derivatives_of_equilibria(name: str, rng: n
     assert np.abs(np.array(moved).T - tip).max() <= 1e-5 * np.abs(tip).max()
 
 
+@pytest.mark.study
 def test_a_pushed_arm_buckles_where_its_last_tendons_go_slack() -> None:
     """Knees on the path of a load: the push shortens the arm until its tendons are slack.
 
@@ -245,6 +250,7 @@ def test_a_pushed_arm_buckles_where_its_last_tendons_go_slack() -> None:
     assert sr.critical_load(held, held.relaxed_motors, (0, 0, -1)) == pytest.approx(knee, rel=1e-6)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("chain", "fields"), [("sections", {"elastic_sections": 2}), ("lumped", {"hinges": 4})])
 def test_an_arm_snaps_where_a_tendon_goes_slack(chain: str, fields: dict[str, int]) -> None:
     """Pushed from above, the bent arm is stable until a tendon goes slack: there the tangent jumps, and it snaps aside."""

@@ -228,6 +228,7 @@ MOTORS = np.repeat([0.060, 0.1225, 0.1865], 3) - 4e-4 * np.array([9.0, -3.0, -5.
 SPRINGY = {"kind": "elastic", "stiffness": 8000.0, "pretension": 0.5}
 
 
+@pytest.mark.study
 def test_elastic_tendons_converge_to_the_strings_and_go_slack_with_them() -> None:
     """Lengths of the motors given: second order in tip and tensions, and the same tendons slack."""
     case = CASES["three segments"]
@@ -245,6 +246,7 @@ def test_elastic_tendons_converge_to_the_strings_and_go_slack_with_them() -> Non
     assert max(errors[1]) < 5e-3
 
 
+@pytest.mark.study
 def test_the_arm_with_tendons_is_the_rod_that_its_parameters_say() -> None:
     """The default robot, motors moved by up to 5 mm, weight, a tip force: 1.4e-3 of the length at its four sections."""
     lengths, radius = (0.060, 0.0625, 0.064), 0.0005
@@ -280,6 +282,7 @@ def test_given_lengths_of_strings_find_their_tensions() -> None:
 # --- Closed forms
 
 
+@pytest.mark.study
 def test_a_tendon_and_a_force_across_are_an_elastica_with_a_moment_at_its_end() -> None:
     """Of an inextensible rod: a straight tendon exerts a moment T d at its end, and a push that changes nothing."""
     piece, tension, force = Piece(LENGTH, BEND, TWIST, 1e7, 0.3), 4.0, (0.05, 0.0, 0.03)

@@ -36,6 +36,7 @@ def test_straight_line_is_straight_and_its_speed_peaks_at_15_eighths() -> None:
     assert fastest == pytest.approx(1.875 * np.abs(span) / 3.0, rel=1e-6)  # 4000 steps: (1 / 4000)^2
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])
 @pytest.mark.parametrize("method", ["newton", "fixed_point"])
 def test_every_waypoint_is_reached(arm: sr.SoftModel, method: str, gravity: tuple | None) -> None:
@@ -48,6 +49,7 @@ def test_every_waypoint_is_reached(arm: sr.SoftModel, method: str, gravity: tupl
         assert np.allclose(again.tip_position, PATH.positions[number], atol=2e-9)
 
 
+@pytest.mark.study
 def test_methods_agree_on_the_motor_angles(arm: sr.SoftModel) -> None:
     """The paper's method with small steps and a high gain approaches the exact answer in proportion to 1 / gain."""
     exact = sr.follow_trajectory(arm, PATH.positions, FORCE, elbow="up")
@@ -60,6 +62,7 @@ def test_methods_agree_on_the_motor_angles(arm: sr.SoftModel) -> None:
     assert errors[1] < 0.02
 
 
+@pytest.mark.study
 def test_the_papers_method_lags_as_measured(arm: sr.SoftModel) -> None:
     """On a 0.5 m move in 1 s the largest error falls from centimetres to millimetres over gains 5 to 100."""
     path = sr.straight_line((0.9, -0.2, 0.1), (0.6, 0.2, 0.1), 1.0, 400)
@@ -72,6 +75,7 @@ def test_the_papers_method_lags_as_measured(arm: sr.SoftModel) -> None:
     assert 2 < largest[-1] < 15
 
 
+@pytest.mark.study
 def test_the_papers_method_is_the_one_written_on_the_dh_table(arm: sr.SoftModel) -> None:
     """Position rows: the same tips, step by step. All six rows, as the paper prints it: it loses the path by half a metre."""
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 200)
@@ -84,6 +88,7 @@ def test_the_papers_method_is_the_one_written_on_the_dh_table(arm: sr.SoftModel)
         assert np.linalg.norm(six - path.positions[:100], axis=1).max() > 0.5
 
 
+@pytest.mark.study
 def test_moments_pressure_and_margin(arm: sr.SoftModel) -> None:
     """The default trajectory of the script: link 1 within 10 % of the paper's 17.51 N m, and 50 kPa as in the paper."""
     found = sr.follow_trajectory(arm, PATH.positions, FORCE, elbow="up")
@@ -105,6 +110,7 @@ def test_a_robot_without_inflated_links_has_no_moments(arm: sr.SoftModel) -> Non
     assert (found.link_moments, found.required_pressure, found.wrinkling_margin) == (None, None, None)
 
 
+@pytest.mark.study
 def test_the_unloaded_trajectory_is_rigid_inverse_kinematics(arm: sr.SoftModel) -> None:
     from tests.support.oracles import rigid_table
 
@@ -114,12 +120,14 @@ def test_the_unloaded_trajectory_is_rigid_inverse_kinematics(arm: sr.SoftModel) 
         assert np.allclose(rigid_table(motors)[:3, 3], target, atol=1e-9)
 
 
+@pytest.mark.study
 def test_a_long_step_is_bridged(arm: sr.SoftModel) -> None:
     found = sr.follow_trajectory(arm, PATH.positions[[0, -1]], FORCE, elbow="up")
     near = sr.follow_trajectory(arm, PATH.positions, FORCE, elbow="up")
     assert np.allclose(found.q_motors[-1], near.q_motors[-1], atol=1e-7)
 
 
+@pytest.mark.study
 def test_an_unreachable_waypoint_is_named(arm: sr.SoftModel) -> None:
     path = sr.straight_line((0.9, 0.0, 0.1), (1.6, 0.0, 0.1), 1.0, 10)
     with pytest.raises(sr.TargetUnreachable, match=r"waypoint 6 of 11: the tip cannot reach .* comes within"):
@@ -128,6 +136,7 @@ def test_an_unreachable_waypoint_is_named(arm: sr.SoftModel) -> None:
         sr.follow_trajectory(arm, path.positions[::-1], FORCE)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("elbow", [None, "up", "down"])
 def test_a_wide_circle_starts_from_the_shoulder_that_can_go_round(arm: sr.SoftModel, elbow: str | None) -> None:
     """From -2.9 to 2.9 rad about the base: the solution nearest to zero, over the shoulder, would meet the limit of motor 1."""
@@ -139,6 +148,7 @@ def test_a_wide_circle_starts_from_the_shoulder_that_can_go_round(arm: sr.SoftMo
     assert found.q_motors[:, 0] == pytest.approx(turn, abs=1e-7)
 
 
+@pytest.mark.study
 def test_a_jump_is_refused_unless_allowed() -> None:
     """Motors within +-1 rad: the way on from the last reachable waypoint is blocked by motor 1; no other branch helps."""
     arm = sr.load_model(sr.InflatableArm(motor_limit=2.0))
@@ -153,6 +163,7 @@ def test_a_jump_is_refused_unless_allowed() -> None:
     assert np.abs(np.diff(found.q_motors, axis=0)).max() > 1.0
 
 
+@pytest.mark.study
 def test_fixed_point_that_fails_on_the_way_is_an_error_that_names_the_waypoint(arm: sr.SoftModel) -> None:
     """The pull grows along the path's lever: at 90 N it fails in the middle, not at the first waypoint."""
     with pytest.raises(sr.EquilibriumNotFound, match=r"waypoint \d+ of 101: the fixed point of method='paper'") as caught:
@@ -160,6 +171,7 @@ def test_fixed_point_that_fails_on_the_way_is_an_error_that_names_the_waypoint(a
     assert not caught.value.best.converged
 
 
+@pytest.mark.study
 def test_a_coarse_path_does_not_make_the_papers_method_unstable(arm: sr.SoftModel) -> None:
     """Explicit Euler explodes at gain times step > 2; long intervals are integrated in parts instead."""
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 10)

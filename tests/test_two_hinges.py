@@ -76,6 +76,7 @@ walls = st.fixed_dictionaries(
 )
 
 
+@pytest.mark.study
 @law("InflatableArm", "robots.inflated_links.InflatedLinks")
 @given(st.lists(walls, min_size=1, max_size=2), st.booleans(), st.sampled_from(LINK_MODELS))
 @settings(max_examples=6, deadline=None, suppress_health_check=[HealthCheck.too_slow])
@@ -166,6 +167,7 @@ def test_bad_links_are_refused_by_name(parameters: dict[str, Any], field: str, t
     assert caught.value.field == field
 
 
+@pytest.mark.study
 @each_row(
     ("arguments", "message"),
     [
@@ -226,6 +228,7 @@ def test_the_stiffness_of_the_paper_on_another_link_is_told(sizes: dict[str, Any
 # --- Bodies
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("torsion", [False, True])
 def test_the_masses_are_those_of_capped_tubes(torsion: bool) -> None:
     """Compared with a cloud of point masses, as the link of the paper is in test_description; and the payload, a ball."""
@@ -272,6 +275,7 @@ def test_a_payload_is_a_weight_at_its_place(model: str) -> None:
 # --- Beams
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("torsion", [False, True])
 def test_the_arm_goes_where_two_beams_go(torsion: bool, rng: np.random.Generator) -> None:
     """Twelve postures and loads up to 12 N at hand: Simo and Reissner's rods, by SciPy; 400 are in test_beam_validity.
@@ -297,6 +301,7 @@ def test_the_arm_goes_where_two_beams_go(torsion: bool, rng: np.random.Generator
     assert np.median(shares["paper"]) > 0.3
 
 
+@pytest.mark.study
 def test_the_pushed_arm_buckles_as_a_column_that_shears() -> None:
     """Haringx: 2 P_e / (1 + sqrt(1 + 4 P_e / A)) with P_e = pi^2 B / 4 (2 L)^2; hinges: within 0.5 %."""
     (bending, _), (shear, _), _ = sr.InflatableArm(link_model="two_hinges").beams
@@ -357,6 +362,7 @@ def test_each_hinge_has_the_plateau_of_its_link() -> None:
 # --- The other questions
 
 
+@pytest.mark.study
 def test_the_solvers_take_it() -> None:
     """Load from torques, motors from the tip, a path, and the compiled answers: each returns what the other was given."""
     model = arm(torsion=True)
@@ -395,6 +401,7 @@ def test_simulators_that_get_the_exported_file_rest_where_we_say(
     assert row.agrees
 
 
+@pytest.mark.study
 def test_the_map_of_an_arm_that_twists() -> None:
     """One target: the posture of the map is an equilibrium there, and the pressure is that of the larger moment."""
     model = arm(torsion=True)

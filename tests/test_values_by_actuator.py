@@ -29,6 +29,7 @@ def own_values(rng: np.random.Generator) -> dict[str, list[float]]:
     return values | {f"rest_bend_{axis}": rng.uniform(-0.3, 0.3, 3).tolist() for axis in "xy"}
 
 
+@pytest.mark.study
 @law("TendonArm")
 @settings(max_examples=4)
 @given(st.integers(0, 2**31))
@@ -63,6 +64,7 @@ def test_every_segment_is_in_balance_with_tendons_of_their_own(seed: int) -> Non
     assert np.allclose(5e3 / np.array(LENGTHS) * stretch, force, atol=1e-6)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("chain", "tolerance"), [("sections", 1e-12), ("lumped", 5e-4)])
 def test_a_rod_that_carries_nothing_has_the_shape_of_rest(chain: str, tolerance: float) -> None:
     """A screw of 0.4, -0.3 and 0.5 rad along 1 m, then one of -0.2 rad; ten hinges err by about (0.7 / 10)^2 / 10 of it."""
@@ -89,6 +91,7 @@ def test_muscles_of_given_length_bend_as_their_own_places_say() -> None:
     assert np.allclose(found.tip_position, expected, atol=1e-10)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", [sr.TendonArm, sr.PccArm])
 def test_one_value_a_segment_is_that_of_each_of_its_actuators(kind: type) -> None:
     """The text is the same by segment and by actuator; a file of before, without relaxed strains, is the same robot."""
@@ -145,6 +148,7 @@ def test_values_of_other_number_or_size_are_refused(fields: dict, told: str) -> 
         sr.TendonArm(**fields)
 
 
+@pytest.mark.study
 @law("robots.fields.per_actuator")
 @given(default=st.floats(0.0, 1e3))
 def test_a_field_by_actuator_is_a_tuple_of_either_length(default: float) -> None:
@@ -164,6 +168,7 @@ def test_the_reader_refuses_relaxed_strains_that_are_none() -> None:
             sr.load_model(text.replace('relaxed="0.0 0.0 0.0 1.0"', f'relaxed="{wrong}"', 1))
 
 
+@pytest.mark.study
 def test_the_stiffness_of_a_backbone_is_what_a_fit_starts_from() -> None:
     """A robot whose fields hold what its backbone has is the same robot; measured values stand as they are."""
     arm = sr.TendonArm(backbone_radius=(4e-4, 5e-4, 6e-4), elastic_sections=1)

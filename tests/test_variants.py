@@ -113,6 +113,7 @@ def check(robot: XacroRobot, random: np.random.Generator, count: int) -> None:
         assert variants.urdf(values) == fresh(other)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", ["arm", "arm that twists", "chambers", "routes", "real actuator"])
 def test_a_variant_has_the_text_that_xacro_writes(name: str) -> None:
     check(SMALL[name](), np.random.default_rng(len(name)), 1)
@@ -137,6 +138,7 @@ def expansions(monkeypatch: pytest.MonkeyPatch) -> list[str]:
     return made
 
 
+@pytest.mark.study
 def test_xacro_runs_again_only_where_a_comparison_comes_out_otherwise(expansions: list[str]) -> None:
     """A link has a shape for collisions if it is longer than 2.5 radii; both kinds are then known."""
     robot = sr.InflatableArm(link_lengths=(0.3,), stiffness=100.0, hinge_offset=0.03)
@@ -260,6 +262,7 @@ def calculator(folder: Path, expressions: Sequence[str]) -> Any:
 NUMBERS = st.one_of(st.floats(-9.0, 9.0), st.sampled_from([0.5, 1.0, 2.0, -3.0, 0.0, -0.0, 1e-7, 1e16, 0.1 + 0.2]))
 
 
+@pytest.mark.study
 @settings(max_examples=25, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     expressions=st.lists(st.sampled_from(FOLLOWED + LOOKED_AT), min_size=1, max_size=12),

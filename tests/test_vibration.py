@@ -52,6 +52,7 @@ def rod_frequencies(tip_mass: float) -> np.ndarray:
     return cantilever_frequencies(tip_mass / (DENSITY * LENGTH)) * unit
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("tip_mass", [0.0, 0.09])
 @pytest.mark.parametrize(("chain", "largest"), [("sections", 0.05), ("lumped", 5e-4)])
 def test_a_clamped_rod_rings_at_its_closed_form_frequencies(chain: str, largest: float, tip_mass: float) -> None:
@@ -110,6 +111,7 @@ def slides(body: str) -> str:
     return f'<robot name="slides"><link name="l0"/>{"".join(parts)}{body}{fixed}</robot>'
 
 
+@pytest.mark.study
 def test_effective_masses_sum_to_the_mass_that_shakes() -> None:
     """A body on three slides gives way as a whole: its mass, in each direction; a rod on end: what does not move is missing."""
     inertia = '<inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/>'
@@ -238,6 +240,7 @@ def test_a_linear_model_is_the_derivative_of_the_full_equations_of_motion(kind: 
                 assert not name.endswith(("_torque", "_force")) or unit == ("N m" if name.endswith("_torque") else "N")
 
 
+@pytest.mark.study
 def test_python_control_takes_it_and_steps_as_the_simulation(tool: Callable[[str], ModuleType]) -> None:
     """A force of 1 mN on the tip: the step response, linear, and the full motion by steps of 1 ms differ by its square."""
     control = tool("control")
@@ -264,6 +267,7 @@ def test_python_control_takes_it_and_steps_as_the_simulation(tool: Callable[[str
     assert np.abs(torques - expected[6:])[:, 1:].max() < 2e-2 * np.abs(expected[6:]).max()
 
 
+@pytest.mark.study
 def test_a_small_torque_moves_the_arm_as_its_linear_model(tool: Callable[[str], ModuleType]) -> None:
     """2 mN m more than what holds the arm: its motors accelerate, and its springs ring."""
     control = tool("control")
@@ -286,6 +290,7 @@ def test_a_small_torque_moves_the_arm_as_its_linear_model(tool: Callable[[str], 
 # --- What users see of them
 
 
+@pytest.mark.study
 def test_modes_are_saved_drawn_and_played(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     """The command writes what the library finds; a saved result is computed again, and refused if it claims something else."""
     asked = ["modes", "inflatable_arm", "--motors", "0.3", "0.6", "-0.8", "--gravity", "--damping-time", "0.01"]

@@ -115,6 +115,7 @@ def gone(pid: int) -> bool:
 # --- A process that serves
 
 
+@pytest.mark.study
 @linux
 def test_it_serves_loopback_only_until_interrupted_beside_another_one() -> None:
     with Process("inflatable_arm", "--force", "0", "10", "-15") as one, Process("inflatable_arm", "--json") as other:
@@ -138,6 +139,7 @@ def test_it_serves_loopback_only_until_interrupted_beside_another_one() -> None:
         assert all(gone(pid) for pid in (*tree, *second))
 
 
+@pytest.mark.study
 @linux
 def test_it_follows_lines_of_a_pipe(arm: sr.SoftModel) -> None:
     with Process("inflatable_arm", "--live", "keyboard", "--motors", "0", "0.5", "-0.5") as process:
@@ -160,6 +162,7 @@ def test_it_follows_lines_of_a_pipe(arm: sr.SoftModel) -> None:
         assert all(gone(pid) for pid in server)
 
 
+@pytest.mark.study
 def test_it_takes_keys_of_a_terminal_and_puts_it_back() -> None:
     keyboard, screen = pty.openpty()
     before = termios.tcgetattr(screen)
@@ -247,6 +250,7 @@ def test_a_viewer_shows_itself_in_a_notebook(browser: object, arm: sr.SoftModel,
 # --- Pages and pictures
 
 
+@pytest.mark.study
 def test_a_saved_result_becomes_a_page(arm: sr.SoftModel, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     path = sr.straight_line((0.8, -0.2, 0.3), (0.9, 0.2, 0.2), 1.0, 5)
     results = {
@@ -275,6 +279,7 @@ def test_a_saved_result_becomes_a_page(arm: sr.SoftModel, tmp_path: Path, capsys
     assert page.read_bytes() != first
 
 
+@pytest.mark.study
 def test_a_tube_grows_and_a_picture_is_taken_where_it_is_told(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
@@ -322,6 +327,7 @@ def test_sliders_begin_with_the_loaded_robot(monkeypatch: pytest.MonkeyPatch, ca
     assert "serving http://127.0.0.1:8123/ (Ctrl-C ends)" in capsys.readouterr().out
 
 
+@pytest.mark.study
 def test_the_browser_of_the_machine_is_opened_on_demand(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
     opened: list[str] = []
     monkeypatch.setattr("webbrowser.open", lambda url: opened.append(url))  # as where there is none
@@ -358,6 +364,7 @@ BAD = {
 }
 
 
+@pytest.mark.study
 @each_row("words", BAD)
 def test_bad_words_are_refused(
     words: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
@@ -378,6 +385,7 @@ def test_results_that_cannot_be_shown_or_moved(arm: sr.SoftModel, tmp_path: Path
         assert "nothing that moves with" in capsys.readouterr().err
 
 
+@pytest.mark.study
 def test_a_branch_is_shown_at_its_last_stable_point(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     """One link that buckles: the fundamental path is stable below the critical force, a bow to its end."""
     model = sr.load_model(sr.InflatableArm(link_lengths=(0.6,), stiffness=100.0))
@@ -404,11 +412,13 @@ def test_a_branch_is_shown_at_its_last_stable_point(tmp_path: Path, capsys: pyte
     assert "given together with --result" in capsys.readouterr().err
 
 
+@pytest.mark.study
 def test_no_answer_ends_with_status_one(capsys: pytest.CaptureFixture) -> None:
     assert main(["view", "inflatable_arm", "--target", "3", "0", "0"]) == 1
     assert "cannot reach" in capsys.readouterr().err
 
 
+@pytest.mark.study
 def test_a_port_is_taken_or_refused(arm: sr.SoftModel, capsys: pytest.CaptureFixture) -> None:
     with socket.create_server(("127.0.0.1", 0)) as free:
         wish = free.getsockname()[1]

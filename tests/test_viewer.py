@@ -33,6 +33,7 @@ def trajectory(arm: sr.SoftModel) -> sr.Trajectory:
     return sr.follow_trajectory(arm, path.positions, FORCE, times=path.times, elbow="up")
 
 
+@pytest.mark.study
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_server_listens_on_loopback_only_and_ends(arm: sr.SoftModel) -> None:
     with Viewer(arm) as viewer:
@@ -43,6 +44,7 @@ def test_server_listens_on_loopback_only_and_ends(arm: sr.SoftModel) -> None:
     assert process.poll() is not None
 
 
+@pytest.mark.study
 def test_two_viewers_take_two_ports(arm: sr.SoftModel) -> None:
     with Viewer(arm) as one, Viewer(arm) as other:
         assert one.port != other.port
@@ -50,6 +52,7 @@ def test_two_viewers_take_two_ports(arm: sr.SoftModel) -> None:
         other.show(sr.solve_equilibrium(arm, (0, 0.1, -0.5), FORCE))
 
 
+@pytest.mark.study
 def test_a_server_keeps_the_last_value_of_a_property_only(arm: sr.SoftModel) -> None:
     """Or every new browser were told every colour of a long live session."""
     with Viewer(arm) as viewer:
@@ -62,6 +65,7 @@ def test_a_server_keeps_the_last_value_of_a_property_only(arm: sr.SoftModel) -> 
     assert sizes[1] == sizes[2]
 
 
+@pytest.mark.study
 @pytest.mark.skipif(sys.platform != "linux", reason="needs SIGSTOP")
 def test_a_server_that_does_not_answer_is_an_error_of_ours(arm: sr.SoftModel) -> None:
     with Viewer(arm) as viewer:
@@ -72,6 +76,7 @@ def test_a_server_that_does_not_answer_is_an_error_of_ours(arm: sr.SoftModel) ->
         viewer._server.process.send_signal(signal.SIGCONT)
 
 
+@pytest.mark.study
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 @pytest.mark.parametrize("how", [signal.SIGTERM, signal.SIGKILL])
 def test_server_ends_when_its_parent_is_killed(how: int) -> None:
@@ -95,6 +100,7 @@ def test_server_ends_when_its_parent_is_killed(how: int) -> None:
     pytest.fail("the server outlives its parent")
 
 
+@pytest.mark.study
 def test_html_is_self_contained(arm: sr.SoftModel, trajectory: sr.Trajectory, tmp_path: Path) -> None:
     with view(arm, trajectory) as viewer:
         file = viewer.write_html(tmp_path / "a.html", title="An <arm>")
@@ -215,6 +221,7 @@ def test_links_are_coloured_by_what_is_left_of_the_wrinkling_moment(arm: sr.Soft
     assert sorted(set(seen)) == list(range(len(WRINKLING_COLOURS)))
 
 
+@pytest.mark.study
 def test_bad_input_is_refused(arm: sr.SoftModel, odd_arm: sr.SoftModel, trajectory: sr.Trajectory) -> None:
     foreign = sr.solve_equilibrium(odd_arm, (0, 0, 0, 0))
     with Viewer(arm) as viewer:

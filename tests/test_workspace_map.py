@@ -50,6 +50,7 @@ def two_elbows(model: sr.SoftModel, target: Any, force: Any, gravity: Any) -> li
     return [needed(sr.solve_ik(model, target, force, gravity=gravity, elbow=side).equilibrium) for side in ("up", "down")]
 
 
+@pytest.mark.study
 def test_a_map_says_what_pinocchio_says(arm: sr.SoftModel, weighed: WorkspaceMap) -> None:
     grid, tried = weighed.grid, 0
     for place in np.argwhere(weighed.reached):
@@ -68,6 +69,7 @@ def test_a_map_says_what_pinocchio_says(arm: sr.SoftModel, weighed: WorkspaceMap
     assert tried > 20
 
 
+@pytest.mark.study
 @law("compiled.sweeps.map_workspace", "compiled.sweeps.WorkspaceMap")
 @settings(max_examples=5)
 @given(st.floats(0.1, 1.3), st.floats(-1.2, 1.2), st.floats(0.0, 60.0))
@@ -88,6 +90,7 @@ def test_what_a_map_says_of_a_target_holds(arm: sr.SoftModel, x: float, z: float
     assert found.reached[0, 0, 0, 0] or not unloaded
 
 
+@pytest.mark.study
 def test_the_posture_is_the_better_elbow(arm: sr.SoftModel, weighed: WorkspaceMap) -> None:
     for x, z, level in ((1, 1, 2), (0, 2, 3), (2, 3, 1)):
         target = (weighed.grid.x[x], 0.0, weighed.grid.z[z])
@@ -96,6 +99,7 @@ def test_the_posture_is_the_better_elbow(arm: sr.SoftModel, weighed: WorkspaceMa
         assert abs(both[0] - both[1]) > 1.0  # [Pa]: the elbows do differ
 
 
+@pytest.mark.study
 def test_at_the_payload_the_required_pressure_is_that_of_the_arm(arm: sr.SoftModel, weighed: WorkspaceMap) -> None:
     assert weighed.payload[0].max() == 40.0  # near the axis all loads are carried
     for x, z in ((2, 1), (3, 2)):
@@ -118,6 +122,7 @@ def planar_postures(target: tuple[float, float], lengths: tuple[float, float]) -
     return [(towards - np.arctan2(second * np.sin(e), first + second * np.cos(e)), e) for e in elbows]
 
 
+@pytest.mark.study
 def test_a_stiff_arm_reaches_the_ring_and_carries_what_statics_says() -> None:
     """Closed form: the springs do not move, the moment is the force times the horizontal distance from the spring."""
     lengths, hinge = (0.7, 0.4), 0.05
@@ -137,6 +142,7 @@ def test_a_stiff_arm_reaches_the_ring_and_carries_what_statics_says() -> None:
             assert made.payload[x, 0, z] == pytest.approx(carried, rel=1e-5)  # springs turn by 20 N m / 1e8 N m/rad
 
 
+@pytest.mark.study
 def test_limited_motors_reach_what_their_limits_leave() -> None:
     """Closed form: elbow and shoulder within a right angle, motor 1 too: behind the base only by leaning over the back."""
     held = sr.load_model(sr.InflatableArm(motor_limit=np.pi / 2))
@@ -149,6 +155,7 @@ def test_limited_motors_reach_what_their_limits_leave() -> None:
     assert 0 < made.reached[:4].sum() < made.reached[4:].sum()
 
 
+@pytest.mark.study
 def test_maps_have_the_symmetries_of_the_arm(arm: sr.SoftModel) -> None:
     x, z = (-0.9, -0.4, 0.4, 0.9), (-0.6, -0.2, 0.2, 0.6)
     down = few(arm, x, z)
@@ -170,6 +177,7 @@ def test_nothing_out_of_reach_is_reached(arm: sr.SoftModel) -> None:
     assert (made.reached_load == -1.0).all()
 
 
+@pytest.mark.study
 def test_loads_in_any_direction_bend_sideways(arm: sr.SoftModel) -> None:
     made = few(arm, (0.7,), (0.3,), (10.0,), direction=(0.0, 3.0, -4.0))
     place = (0, 0, 0, 0)
@@ -283,6 +291,7 @@ def small_blocks(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(mapping, "BLOCK", 3)  # 24 blocks
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("small_blocks")
 def test_threads_give_the_same_bytes(arm: sr.SoftModel) -> None:
     one, two = (map_workspace(arm, GRID, LOADS[::2], backend="python", threads=count) for count in (1, 2))
@@ -321,6 +330,7 @@ def test_a_cluster_that_loses_a_worker_gives_the_same_bytes(
     assert len(list(tmp_path.glob("block_*.npz"))) == 24
 
 
+@pytest.mark.study
 def test_a_scheduler_that_does_not_answer_is_named(tool: Callable[[str], ModuleType], monkeypatch: pytest.MonkeyPatch) -> None:
     tool("distributed")
     monkeypatch.setattr(scheduling, "_PATIENCE", 0.3)
@@ -380,6 +390,7 @@ def test_the_picture_shows_the_map(weighed: WorkspaceMap, tool: Callable[[str], 
         workspaces.workspace_maps(weighed, load=np.nan)
 
 
+@pytest.mark.study
 def test_the_script_writes_map_and_picture(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     file = tmp_path / "map.npz"
     arguments = ["--cells", "4", "--loads", "3", "--max-load", "30", "--gravity", "--backend", "python", "--output", str(file)]
@@ -406,6 +417,7 @@ def test_the_script_explains_itself(capsys: pytest.CaptureFixture) -> None:
     assert "--scheduler ADDRESS" in capsys.readouterr().out
 
 
+@pytest.mark.study
 @each_row(
     ("arguments", "message"),
     [

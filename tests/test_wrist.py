@@ -140,10 +140,12 @@ def check_reached(model: sr.SoftModel, count: int, seed: int) -> None:
     assert missed <= 0.02 * count  # where the elbow is nearly straight or folded, random starts may miss the nearest solution
 
 
+@pytest.mark.study
 def test_poses_of_random_motors_are_reached_under_load(wristed: sr.SoftModel) -> None:
     check_reached(wristed, 6, 5)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "fields", [{"link_model": "two_hinges", "torsion": True}, {"payload": (0.4, 0.02, 0.0, 0.03)}, {"max_moment": 15.0}]
 )
@@ -154,6 +156,7 @@ def test_other_arms_with_a_wrist_hold_poses_too(fields: dict) -> None:
     check_reached(model, 1, 6)
 
 
+@pytest.mark.study
 @pytest.mark.filterwarnings("ignore::softrobots.AssumedStiffnessWarning")
 def test_a_wrist_behind_muscles_holds_poses() -> None:
     """The muscles stand behind the motors of the wrist in `q_motors`."""
@@ -195,6 +198,7 @@ def closed_form(pose: pin.SE3, upper: float, fore: float, hand: float) -> list[n
     return [(one + np.pi) % (2 * np.pi) - np.pi for one in solutions]
 
 
+@pytest.mark.study
 def test_a_stiff_arm_has_the_solutions_of_the_closed_form() -> None:
     """At 1e12 N m/rad the arm is rigid: same nearest solution, and no solution that the closed form does not have.
 
@@ -211,6 +215,7 @@ def test_a_stiff_arm_has_the_solutions_of_the_closed_form() -> None:
             assert min(turns) < 1e-6
 
 
+@pytest.mark.study
 def test_scipy_finds_no_nearer_motors(wristed: sr.SoftModel) -> None:
     """SLSQP from random starts: least change of the motors at given pose and balance of the springs, all ten joints unknown."""
     random = np.random.default_rng(2)
@@ -235,6 +240,7 @@ def test_scipy_finds_no_nearer_motors(wristed: sr.SoftModel) -> None:
         assert np.linalg.norm(found.q_motors) <= best + 1e-4  # its own tolerance
 
 
+@pytest.mark.study
 def test_a_pose_may_be_an_se3_a_matrix_or_position_and_orientation(wristed: sr.SoftModel) -> None:
     (_, load, pose), *_ = poses(wristed, 1, 8)
     one, two, three = (
@@ -253,6 +259,7 @@ def test_a_pose_may_be_an_se3_a_matrix_or_position_and_orientation(wristed: sr.S
         sr.solve_ik(sr.load_model(sr.InflatableArm()), pose)
 
 
+@pytest.mark.study
 def test_what_is_out_of_reach_or_singular_is_named(wristed: sr.SoftModel) -> None:
     with pytest.raises(sr.TargetUnreachable, match=r"within 0\.1 m"):
         sr.solve_ik(wristed, pin.SE3(np.eye(3), np.array([1.5, 0.0, 0.0])))
@@ -277,6 +284,7 @@ def test_an_arm_whose_last_joints_are_no_spherical_wrist_has_none() -> None:
     assert spherical_wrist(sr.load_model(moved)) is None  # the axes do not meet
 
 
+@pytest.mark.study
 def test_the_elbow_is_the_last_motor_before_the_wrist(wristed: sr.SoftModel) -> None:
     """Its height over the line from shoulder to tip, computed here from the joint positions."""
     pose = sr.solve_equilibrium(wristed, (0.3, 0.2, -0.8, 0.4, 0.2, 0.1)).transform_tip_to_world
@@ -308,6 +316,7 @@ def test_a_straight_line_turns_about_one_axis(path: sr.Path3D) -> None:
         sr.straight_line((0, 0, 0), np.eye(4), 1.0)
 
 
+@pytest.mark.study
 def test_a_path_of_poses_is_followed_under_load(wristed: sr.SoftModel, path: sr.Path3D, tmp_path: Path) -> None:
     load = {"force": PUSH, "gravity": sr.EARTH_GRAVITY}
     followed = sr.follow_trajectory(wristed, path.targets, times=path.times, **load)
@@ -330,6 +339,7 @@ def test_a_path_of_poses_is_followed_under_load(wristed: sr.SoftModel, path: sr.
         sr.follow_trajectory(wristed, np.zeros((2, 3, 3)))
 
 
+@pytest.mark.study
 def test_a_path_through_a_singular_wrist_passes_and_one_beside_it_is_named(wristed: sr.SoftModel) -> None:
     """Through yaw = 90 degrees the hand goes on; 1e-4 rad beside it pitch and roll would turn half round at one point."""
     q = np.array([0.3, 0.6, -0.8, 0.2, 1.2, 0.1])
@@ -356,6 +366,7 @@ def wristed_pose(model: sr.SoftModel, motors: np.ndarray) -> pin.SE3:
 # --- The command
 
 
+@pytest.mark.study
 def test_the_command_finds_poses_and_follows_files_of_them(
     wristed: sr.SoftModel, path: sr.Path3D, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:

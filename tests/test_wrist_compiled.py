@@ -53,6 +53,7 @@ def check_rows(model: sr.SoftModel, batch: Any, targets: np.ndarray, forces: np.
         assert np.all((batch.q_motors[row] >= model.motor_limits[:, 0]) & (batch.q_motors[row] <= model.motor_limits[:, 1]))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY], ids=["weightless", "heavy"])
 def test_poses_are_reached_as_by_solve_ik(
     wristed: sr.SoftModel, solver: CompiledModel, gravity: Any, rng: np.random.Generator
@@ -68,6 +69,7 @@ def test_poses_are_reached_as_by_solve_ik(
         assert np.allclose(one.q_motors, batch.q_motors[row], atol=1e-6)
 
 
+@pytest.mark.study
 def test_more_starts_reach_more_poses_from_afar(wristed: sr.SoftModel, solver: CompiledModel, rng: np.random.Generator) -> None:
     _, forces, poses = made(wristed, rng, 8, None)
     few, many = (solver.inverse_kinematics(poses, forces, starts=starts) for starts in (1, 12))
@@ -94,6 +96,7 @@ def test_no_row_touches_another_and_each_failure_has_its_status(wristed: sr.Soft
         check_rows(wristed, there, turned[None], PUSH[None], None)
 
 
+@pytest.mark.study
 def test_a_path_of_poses_is_that_of_follow_trajectory(wristed: sr.SoftModel, solver: CompiledModel) -> None:
     """Also from one end to the other at once, through orientations between: 1e-9 over the least singular value apart."""
     first = pin.SE3(pin.rpy.rpyToMatrix(0.2, 0.9, -0.4), np.array([0.7, -0.5, 0.4]))
@@ -108,6 +111,7 @@ def test_a_path_of_poses_is_that_of_follow_trajectory(wristed: sr.SoftModel, sol
         check_rows(wristed, batch, path.targets[rows], np.tile(PUSH, (len(batch.q_motors), 1)), gravity)
 
 
+@pytest.mark.study
 def test_robots_that_cannot_have_poses_say_so(solver: CompiledModel) -> None:
     for robot in (sr.InflatableArm(), sr.PccArm(segment_lengths=(0.4, 0.4), elastic_sections=1)):
         with pytest.raises(sr.ParameterError, match="poses need six motors and a chain that is unrolled"):
