@@ -245,6 +245,7 @@ def test_only_sections_have_strains_to_lock(plain: CompiledModel) -> None:
 # --- Lanes
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("gravity", [None, GRAVITY])
 def test_no_failure_touches_another(solver: CompiledModel, gravity: Any, rng: np.random.Generator) -> None:
     """NaN, infinities and monstrous numbers between good rows: those have the same bits as without."""
@@ -361,6 +362,7 @@ def test_estimates_with_gravity(plain: CompiledModel, rng: np.random.Generator) 
     assert np.max(apart(found.forces[well], forces[well])) < 1e-8
 
 
+@pytest.mark.study
 @each_row("motors", [(0.4, 0.3, 0.0), (0.2, np.pi / 2.0 - 0.4, 0.8)])
 def test_hidden_forces_are_said_to_be_hidden(solver: CompiledModel, motors: tuple[float, float, float]) -> None:
     """Without load: along a straight arm; and sideways where the tip is above the first motor."""
@@ -464,6 +466,7 @@ def test_targets_made_by_equilibria_are_reached(solver: CompiledModel, rng: np.r
     assert_arrived(solver, found, targets, forces, np.flatnonzero(found.certified)[:100])
 
 
+@pytest.mark.study
 def test_the_default_start_is_singular_and_does_not_matter(solver: CompiledModel, rng: np.random.Generator) -> None:
     """At zero the elbow is straight: the first step is damped. Newton from one start need not find every target."""
     motors, forces = cases(rng, 100, 1.0, 15.0)

@@ -91,6 +91,7 @@ def test_damaged_files_are_refused_or_valid(reader: str, seed: int, tmp_path_fac
     assert time.process_time() - start < SECONDS
 
 
+@pytest.mark.study
 @each_row("reader", data.READERS)
 def test_what_is_not_damaged_is_read(reader: str, tmp_path: Path) -> None:
     corpus, _, read, ending = data.READERS[reader]
@@ -729,6 +730,7 @@ def uses_of(file: Path) -> set[str]:
     return found
 
 
+@pytest.mark.study
 def test_nothing_that_is_read_is_run() -> None:
     """No pickle, no eval, no shell, no reader of YAML that makes objects: every use of such a thing has its reason."""
     words = re.compile(r"exec|eval|compile\(|__import__|system|popen|load|shell|pickle|marshal|shelve|dill")

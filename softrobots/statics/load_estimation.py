@@ -20,7 +20,7 @@ from softrobots.core.result_file import text
 from softrobots.core.summary import Part, Summarised
 from softrobots.environment.environment import Environment
 from softrobots.model.friction_coordinates import check_frictionless
-from softrobots.model.soft_model import SoftModel
+from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state, from_before
 from softrobots.statics.load_summary import load_parts
@@ -206,7 +206,7 @@ def check_feels(model: SoftModel) -> None:
     Raises:
         ParameterError: If there are none, or all of them are given tensions or pressures.
     """
-    if model.n_motors == 0:
+    if check_model(model).n_motors == 0:
         raise ParameterError("model", model, "a robot with at least one motor")
     if not model.actuators.feels.any():
         requirement = "a robot with muscles of given length, elastic tendons or McKibben muscles: given forces feel no load"

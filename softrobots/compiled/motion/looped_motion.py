@@ -28,12 +28,13 @@ from softrobots.compiled.motion.articulated import (
     moved_wrench,
 )
 from softrobots.compiled.motion.gauss_step import corrections, right_hand_side
+from softrobots.compiled.motion.group_record import GroupRecord
 from softrobots.compiled.motion.motion_groups import ElementParts, MovingGroup, group_signature, motion_groups, moving_parts
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block, TableColumns
-from softrobots.compiled.trace.complex_numbers import ComplexScalar, of_parts, parts_of
-from softrobots.compiled.trace.expressions import Expression, Scalar
+from softrobots.compiled.trace.complex_numbers import of_parts, parts_of
+from softrobots.compiled.trace.expressions import Scalar
 
 
 @dataclass(frozen=True)
@@ -93,52 +94,6 @@ class GroupLayout:
         return None if self.stages == 1 else ("stage", self.stages)
 
 
-class _Record:
-    """Values of a group for later passes, in the workspace from `at` on, of a function with a loop at all `stages`."""
-
-    def __init__(self, stages: int) -> None:
-        """Begin without values."""
-        self.size = 0
-        self._stages = stages
-        self._kept: dict[int, Expression] = {}
-
-    def keep(self, block: Block, values: Any) -> Any:
-        """Write values at the end of a function; return what reads them, of the same shape. Constants stay constants."""
-        array = np.asarray(values, dtype=object)
-        kept = array.copy()
-        for index in np.ndindex(*array.shape):
-            kept[index] = self._one(block, array.item(*index))
-        return kept
-
-    def _one(self, block: Block, value: Scalar) -> Scalar:
-        if isinstance(value, ComplexScalar):
-            return ComplexScalar(self._one(block, value.re), self._one(block, value.im))
-        if not isinstance(value, Expression):
-            return value
-        if value.operation == "neg":
-            return -self._one(block, value.arguments[0])
-        negative = -value
-        if isinstance(negative, Expression) and negative.number in self._kept:
-            return -self._kept[negative.number]
-        if value.number not in self._kept:
-            base = "at" if block.loop is None else "at + stage"
-            block.store(self.size, value, base)
-            self._kept[value.number] = block.load(self.size, base)
-            self.size += 1 if block.loop is None else self._stages
-        return self._kept[value.number]
-
-    def last(self, block: Block, values: Any) -> Any:
-        """Return what reads values that have been kept at all stages, at the last one."""
-        return np.vectorize(lambda value: self._last(block, value), otypes=[object])(values)
-
-    def _last(self, block: Block, value: Scalar) -> Scalar:
-        if not isinstance(value, Expression) or self._stages == 1:
-            return value
-        if value.operation == "neg":
-            return -self._last(block, value.arguments[0])
-        return block.load(value.arguments[2] + self._stages - 1, "at")
-
-
 def group_kinds(plan: MotionPlan, places: GroupLayout) -> list[Kind]:
     """Trace the code of every kind of group; `rows` of a kind are the first elements of its groups."""
     kinds: dict[Any, list[tuple[int, ...]]] = {}
@@ -163,7 +118,7 @@ def _trace_kind(
             ("place", "Outward pass with positions alone."),
         )
     )
-    columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), _Record(places.stages)
+    columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), GroupRecord(places.stages)
     group = MovingGroup(plan, out, groups, columns, parts, places.state if places.stages > 1 else None)
     moving = _trace_move(out, record, places, group)
     factors = _trace_factors(factor, record, plan, places, group, moving.last(record, factor))
@@ -182,7 +137,7 @@ def _trace_kind(
         if stages > 1:
             back.store_spaced(written, gradient, stages, "2 * q + stage")
         else:
-            back.store_all(written + (n if layout.in_stages else 0), gradient, "q")
+            back.store_all(plan.last_torques, gradient, "q")
         back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
         blocks.append(back)
         spaced = plan.side_by_side and plan.routes is None
@@ -228,7 +183,7 @@ class _Moving(NamedTuple):
     torques: Any
     """Torque of spring, damper and muscles on each unknown (k)."""
 
-    def last(self, record: _Record, block: Block) -> _Moving:
+    def last(self, record: GroupRecord, block: Block) -> _Moving:
         """Return the same at the last stage."""
         at = partial(record.last, block)
         joints = []
@@ -238,7 +193,7 @@ class _Moving(NamedTuple):
         return _Moving(joints, self.wrenches, at(self.reach), at(self.slopes), self.torques)
 
 
-def _trace_move(out: Block, record: _Record, places: GroupLayout, group: MovingGroup) -> _Moving:
+def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: MovingGroup) -> _Moving:
     frame = load_frame(out, places.frame, places.stages, places.index)
     states, slopes = group.joints(out, places.cosine, places.sine)
     turns = {place: element.rotation for place, element in enumerate(group.elements)}
@@ -259,7 +214,7 @@ def _trace_move(out: Block, record: _Record, places: GroupLayout, group: MovingG
 
 
 def _trace_factors(
-    factor: Block, record: _Record, plan: MotionPlan, places: GroupLayout, group: MovingGroup, moving: _Moving
+    factor: Block, record: GroupRecord, plan: MotionPlan, places: GroupLayout, group: MovingGroup, moving: _Moving
 ) -> ArticulatedGroup:
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
     quarter, pulls = plan.factors(factor)[1] * (1.0 / plan.massive(factor)), vector(factor.loads(places.pull, 12))

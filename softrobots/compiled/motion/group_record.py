@@ -1,0 +1,57 @@
+"""What a group of elements keeps of one pass of its motion for later ones."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.complex_numbers import ComplexScalar
+from softrobots.compiled.trace.expressions import Expression, Scalar
+
+
+class GroupRecord:
+    """Values of a group for later passes, in the workspace from `at` on, of a function with a loop at all `stages`."""
+
+    def __init__(self, stages: int) -> None:
+        """Begin without values."""
+        self.size = 0
+        self._stages = stages
+        self._kept: dict[int, Expression] = {}
+
+    def keep(self, block: Block, values: Any) -> Any:
+        """Write values at the end of a function; return what reads them, of the same shape. Constants stay constants."""
+        array = np.asarray(values, dtype=object)
+        kept = array.copy()
+        for index in np.ndindex(*array.shape):
+            kept[index] = self._one(block, array.item(*index))
+        return kept
+
+    def _one(self, block: Block, value: Scalar) -> Scalar:
+        if isinstance(value, ComplexScalar):
+            return ComplexScalar(self._one(block, value.re), self._one(block, value.im))
+        if not isinstance(value, Expression):
+            return value
+        if value.operation == "neg":
+            return -self._one(block, value.arguments[0])
+        negative = -value
+        if isinstance(negative, Expression) and negative.number in self._kept:
+            return -self._kept[negative.number]
+        if value.number not in self._kept:
+            base = "at" if block.loop is None else "at + stage"
+            block.store(self.size, value, base)
+            self._kept[value.number] = block.load(self.size, base)
+            self.size += 1 if block.loop is None else self._stages
+        return self._kept[value.number]
+
+    def last(self, block: Block, values: Any) -> Any:
+        """Return what reads values that have been kept at all stages, at the last one."""
+        return np.vectorize(lambda value: self._last(block, value), otypes=[object])(values)
+
+    def _last(self, block: Block, value: Scalar) -> Scalar:
+        if not isinstance(value, Expression) or self._stages == 1:
+            return value
+        if value.operation == "neg":
+            return -self._last(block, value.arguments[0])
+        return block.load(value.arguments[2] + self._stages - 1, "at")
