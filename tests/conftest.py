@@ -30,7 +30,7 @@ PATIENCE = 120.0
 
 
 JOBS = {
-    "study": "of scripts/: the project's own studies, tables and pages; proofs by thousands of random cases; and what takes seconds",
+    "study": "of scripts/: the project's studies, tables and pages; proofs by thousands of random cases; what takes seconds",
     "system": "in a real browser, notebook or documentation site, of code in guides, or with a C compiler",
 }
 """Marks of tests that run in jobs of their own, and what these tests are."""
