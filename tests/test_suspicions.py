@@ -190,7 +190,7 @@ def test_a_noisy_fit_is_not_called_mirrored(cases: int) -> None:
         rows = seen_from_anywhere(seed, int(random.integers(8, 24)), random.uniform(0.01, 0.03), random.uniform(120.0, 260.0))
         robot = replace(ROUGHLY, link_lengths=(0.6, 0.6 + 0.1 * (seed % 2)))
         fit = sr.identify(robot, rows, FITTED)
-        left = fit.residuals["positions.tip"]
-        tried += bool(np.sum(left**2) > 0.02 * np.sum((rows.measured["positions.tip"] - left) ** 2))
+        left, tips = fit.residuals["positions.tip"], rows.measured["positions.tip"]
+        tried += bool(np.sum(left**2) > 0.02 * np.sum((tips - tips.mean(axis=0)) ** 2))
         assert not [text for text in hints(fit) if "fitting again" in text], seed
-    assert tried > 0.5 * cases
+    assert tried > 0.3 * cases  # fits so bad that axes are suspected

@@ -154,6 +154,10 @@ class ParameterSet:
         numbers = finite_array("values", values, (len(self.parameters),))
         return self._models(tuple(np.where(self.of_model, numbers, 0.0).tolist()))
 
+    def __getstate__(self) -> dict[str, Any]:
+        """Return what a copy keeps: all but the last models."""
+        return {name: value for name, value in vars(self).items() if name != "_models"}
+
     @cached_property
     def _models(self) -> Callable[[tuple[float, ...]], SoftModel]:
         """The last models, which stay the same while only the base, markers or offsets change."""
