@@ -231,9 +231,8 @@ def _start_resist(plan: MotionPlan, places: GroupLayout) -> Block:
 def _add_mass(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("add_mass", "Add a part of Rayleigh's term for the mass.", ("i", "at", "j"))
     layout, routes = plan.layout, plan.routes
-    to, rate = plan.torques[0] if routes is None or not routes.held else routes.dampers, layout.rate
-    if plan.side_by_side:
-        rate = places.state + 2 * places.unknowns
+    to = plan.torques[0] if routes is None or not routes.held else routes.dampers
+    rate = places.state + 2 * places.unknowns if plan.side_by_side else layout.rate
     block.store(to, block.load(to, "i") + block.load(layout.mass_damping, "at") * block.load(rate, "j"), "i")
     return block
 

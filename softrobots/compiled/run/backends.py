@@ -43,7 +43,6 @@ from softrobots.compiled.run.pairs import fabs, floor, load_pair, sqrt, store_pa
 zeros = np.zeros
 
 """
-_JIT = "@njit(cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, fastmath={'contract', 'arcp', 'nsz'})\n"
 
 
 def available_backend() -> str:
@@ -141,7 +140,11 @@ def jitted(constants: str, functions: str) -> ModuleType:
 
 def _decorated(functions: str) -> str:
     """Return functions with numba's decorators."""
-    return re.sub(r"^def ", _JIT + "def ", functions, flags=re.MULTILINE)
+    from softrobots.compiled.run.pairs import FASTMATH
+
+    fastmath = ", ".join(map(repr, FASTMATH))
+    decorator = f"@njit(cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, fastmath={{{fastmath}}})\n"
+    return re.sub(r"^def ", f"{decorator}def ", functions, flags=re.MULTILINE)
 
 
 def _module_of(code: Any, **functions: Callable[[Any], Any]) -> ModuleType:
