@@ -639,6 +639,13 @@ def test_memory_of_a_batch_is_what_it_needs_beyond_its_outputs(monkeypatch: pyte
     assert processes.peak_bytes(count, "numba") / count == pytest.approx(80.0, abs=8.0)
 
 
+@pytest.mark.study
+def test_processes_of_their_own_need_no_surroundings(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("PYTHONPATH", raising=False)
+    assert np.isfinite(processes.bytes_per_case(1000, "python"))
+    assert processes.first_answer()["total"] > 0
+
+
 def test_without_numba_the_rest_is_still_timed(monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object, **__: object) -> None:
         raise sr.MissingDependency("numba", "fast")
