@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -14,6 +15,7 @@ import softrobots as sr
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics import simulation
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.dynamics.time_grid import merged_times
 from tests.support.laws import law
 from tests.support.pendulums import LENGTH, MASS, double_pendulum, pendulum, tip_of
 
@@ -140,6 +142,58 @@ def test_the_tip_stays_within_the_tolerance_over_a_run_with_a_jump_of_the_load(f
         assert 0.25 * moved.tip_error < errors.max() < moved.tip_error <= tolerance  # 1 / 3.6 if two runs are enough
         assert np.abs(moved.steps - 0.31).min() < 1e-12
         assert np.abs(moved.energy.balance).max() < 1e-2 * np.abs(moved.energy.load_work).max()
+
+
+@pytest.mark.parametrize(("duration", "begin", "end"), [(2.0, 0.5, 0.7), (1.0, 0.1, 0.3)])
+def test_a_pulse_between_round_times_moves_a_robot_as_dop853_says(duration: float, begin: float, end: float) -> None:
+    """A jump is found by bisection, and the sample at which the load begins to change: the same time but for a rounding."""
+    model, fast = pendulum(2, 4.0), sr.compile(pendulum(2, 4.0), backend="python")
+
+    def force(t: float) -> tuple[float, float, float]:
+        return (3.0 * (begin < t < end), 0.0, 0.0)
+
+    accurate: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+    state = np.zeros(4)
+    for first, last, push in ((begin, end, 3.0), (end, duration, 0.0)):
+        state = solve_ivp(double_pendulum, (first, last), state, args=(4.0, 0.0, push), **accurate).y[:, -1]
+    batch = fast.simulations(duration, np.zeros((2, 0)), forces=[force, force], damping_time=0.0, tolerance=1e-4)
+    for moved in (
+        engine(duration, (), force=force, damping_time=0.0, tolerance=1e-4)
+        for engine in (partial(sr.simulate, model), fast.simulate)
+    ):
+        assert np.linalg.norm(moved.tip_position[-1] - tip_of(*state[:2])) < 1e-4  # the tolerance
+        assert np.diff(moved.steps).min() > 1e-9 * duration
+        assert np.abs(moved.energy.balance).max() < 1e-2 * np.abs(moved.energy.load_work).max()
+    assert np.linalg.norm(batch.tip_position[:, -1] - tip_of(*state[:2]), axis=1).max() < 1e-4
+
+
+def test_given_steps_are_of_second_order_through_jumps_between_them() -> None:
+    """Of a table and of a function, beside steps of any length; both engines take the same ones."""
+    model, jump, last = pendulum(2, 4.0), 0.3037, 0.7
+    fast = sr.compile(model, backend="python")
+    accurate: dict[str, Any] = {"method": "DOP853", "rtol": 1e-12, "atol": 1e-13}
+    state = solve_ivp(double_pendulum, (0.0, jump), np.zeros(4), args=(4.0, 0.0, 3.0), **accurate).y[:, -1]
+    state = solve_ivp(double_pendulum, (jump, last), state, args=(4.0, 0.0, 0.0), **accurate).y[:, -1]
+    for force in (as_table([0.0, jump, jump], [3.0, 3.0, 0.0]), lambda t: (3.0 * (t < jump), 0.0, 0.0)):
+        errors = []
+        for h in (4e-3, 2e-3, 1e-3):
+            moved = sr.simulate(model, last, (), force=force, damping_time=0.0, time_step=h)
+            errors.append(np.linalg.norm(moved.tip_position[-1] - tip_of(*state[:2])))
+            same = fast.simulate(last, (), force=force, damping_time=0.0, time_step=h)
+            np.testing.assert_allclose(same.tip_position, moved.tip_position, rtol=0, atol=1e-9)  # what both promise
+        assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(2.0, abs=0.1)
+
+
+@given(
+    groups=st.lists(st.lists(st.floats(-0.1, 2.1), max_size=8), min_size=1, max_size=3),
+    apart=st.sampled_from([1e-9, 1e-2, 0.3]),
+)
+def test_times_that_are_one_are_left_out_from_the_last_group_on(groups: list[list[float]], apart: float) -> None:
+    merged = merged_times(apart, 2.0, *map(np.array, groups))
+    assert (merged[0], merged[-1]) == (0.0, 2.0)
+    assert np.all(np.diff(merged) > apart)
+    within = [time for time in groups[0] if apart < time < 2.0 - apart]
+    assert not within or min(within) in merged
 
 
 def test_a_short_pulse_in_a_long_table_is_not_passed_over() -> None:

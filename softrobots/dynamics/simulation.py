@@ -30,7 +30,7 @@ from softrobots.dynamics.step_control import (
     rule_of_order,
     tip_distances,
 )
-from softrobots.dynamics.time_grid import grid_of_rows, grid_with_kicks, steps_and_rows
+from softrobots.dynamics.time_grid import SAME_TIME, grid_of_rows, grid_with_stops, merged_times, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
@@ -129,10 +129,8 @@ def simulate(
             change = first_kick(path, first.rates[: model.n_motors])
             return Recorder(rule, first if change is None else rule.kicked(first, change), rows)
 
-        if h is not None:
-            stops = grid_with_kicks(end, h, np.array(list(path.kicks)))
-        else:
-            stops = np.unique(np.concatenate([[end], path.breaks, load.breaks]))
+        breaks = path.kick_times, path.breaks, load.breaks
+        stops = merged_times(SAME_TIME * end, end, *breaks) if h is None else grid_with_stops(end, h, *breaks)
         if drive is not None:
             stops = drive.with_samples(stops)
         if h is None and scheme == GaussRule.order:

@@ -13,6 +13,9 @@ from softrobots.core.errors import ParameterError
 TIP_TOLERANCE = 5e-4
 """Default of the largest error of the tip, relative to the reach of the robot."""
 
+SAME_TIME = 1e-9
+"""Share of a duration within which times are the same one: jumps are found by bisection, to a rounding."""
+
 _COARSEST = 100  # steps at least, of the first of the runs of fourth order
 _ROWS = 200  # of a motion, if no output step is given
 _MOST_TIMES = 10_000_000  # steps, rows or samples of a motion, for which memory suffices
@@ -42,19 +45,27 @@ def grid_of_rows(rows: FloatArray) -> FloatArray:
     return np.append((rows[:-1, None] + np.diff(rows)[:, None] * np.arange(parts) / parts).ravel(), rows[-1])
 
 
-def grid_with_kicks(end: float, step: float, kicks: FloatArray) -> FloatArray:
-    """Return the times of `time_grid` with those at which velocities of motors jump among them, shape (n,) [s].
+def grid_with_stops(end: float, step: float, *stops: FloatArray) -> FloatArray:
+    """Return the times of `time_grid`, with groups of stops in place of those a millionth of a step beside them, shape (n,) [s]."""
+    return merged_times(1e-6 * step, end, *stops, time_grid(end, step))
+
+
+def merged_times(apart: float, end: float, *groups: FloatArray) -> FloatArray:
+    """Return zero, the end, and the times of groups between them, ascending, shape (n,) [s].
 
     Args:
+        apart: Times no further from each other are one [s]: that of the group named first, in a group the earliest.
         end: Last time [s].
-        step: Length of a step [s].
-        kicks: Times of the jumps, shape (k,) [s]; times of the grid within a millionth of a step of one are left out.
+        groups: Times, each shape (k,) [s].
     """
-    grid, inside = time_grid(end, step), kicks[(kicks > 0.0) & (kicks < end - 1e-6 * step)]
-    if len(inside):
-        replaced = np.abs(grid[:, None] - inside).min(axis=1) <= 1e-6 * step
-        grid = np.unique(np.concatenate([grid[~replaced], inside]))
-    return grid
+    found = np.array([0.0, end])
+    for group in groups:
+        times = np.unique(group[(group > 0.0) & (group < end)])
+        places = np.searchsorted(found, times)
+        alone = np.minimum(times - found[places - 1], found[places] - times) > apart
+        times = times[alone & (np.diff(times, prepend=-np.inf) > apart)]
+        found = np.insert(found, np.searchsorted(found, times), times)
+    return found
 
 
 def steps_and_rows(

@@ -16,7 +16,8 @@ from softrobots.statics.trajectory import Trajectory
 _SAMPLES = 1000  # of a function of time, among which its jumps are searched
 _NEAR = 1e-7  # of the duration: how far apart a function is compared for its velocity
 _LEAST_KINK = 1e-3  # of the largest velocity: jumps of the velocity that count
-_MOST_KINKS = 200  # rows up to which steps end at each row of a table
+MOST_KINKS = 200
+"""Rows up to which steps end at each row of a table."""
 _SHARP = 10.0  # times as much as a row of a longer table usually bends, at which steps end
 
 Signal = Callable[[float], FloatArray]
@@ -62,6 +63,11 @@ class MotorPath:
             return self._signal(times)
         return np.array([self._signal(time) for time in times.tolist()]).reshape(len(times), -1)
 
+    @property
+    def kick_times(self) -> FloatArray:
+        """Times at which velocities of the actuators jump, shape (n,) [s]."""
+        return np.array(list(self.kicks))
+
     def _find_kicks(self, model: SoftModel, duration: float) -> None:
         """Find the jumps of tensions and of velocities; positions have none."""
         placed, near = model.actuators.n_placed, _NEAR * duration
@@ -89,7 +95,7 @@ class MotorPath:
             self.kicks[time - float(gap / (after - before)[most])] = after - before
         unplaced = np.zeros(model.n_motors - placed)
         self.kicks = {time: np.concatenate([change, unplaced]) for time, change in self.kicks.items()}
-        kinks = np.array(list(self.kicks))
+        kinks = self.kick_times
         tension_jumps = find_jumps(lambda time: signal(time)[placed:], duration)
         onsets = [time for time in find_onsets(signal, duration) if np.abs(kinks - time).min(initial=np.inf) > 100.0 * near]
         self.breaks = np.concatenate([kinks, tension_jumps, onsets])
@@ -220,7 +226,7 @@ def find_onsets(signal: Signal, duration: float) -> FloatArray:
     times = np.linspace(0.0, duration, _SAMPLES + 1)
     changes = np.abs(np.diff([signal(time) for time in times.tolist()], axis=0)).max(axis=1, initial=0.0)
     onsets = times[1:-1][np.diff(changes > 1e-6 * changes.max(initial=0.0))]
-    return onsets if len(onsets) <= _MOST_KINKS else np.zeros(0)
+    return onsets if len(onsets) <= MOST_KINKS else np.zeros(0)
 
 
 def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
@@ -241,7 +247,7 @@ def _table(name: str, value: Any, size: int) -> tuple[Signal, FloatArray]:
         share = (time - times[row - 1]) / (times[row] - times[row - 1])
         return np.asarray(values[row - 1] + share * (values[row] - values[row - 1]))
 
-    return signal, times if len(times) <= _MOST_KINKS else times[_sharpest(times, values)]
+    return signal, times if len(times) <= MOST_KINKS else times[_sharpest(times, values)]
 
 
 def _sharpest(times: FloatArray, values: FloatArray) -> Any:
@@ -250,7 +256,7 @@ def _sharpest(times: FloatArray, values: FloatArray) -> Any:
     slopes = np.diff(values, axis=0) / np.where(gaps > 1e-12 * (times[-1] - times[0]), gaps, 1.0)
     bends = np.abs(np.diff(slopes, axis=0, prepend=0.0, append=0.0)).max(axis=1)
     much = np.flatnonzero(bends > _SHARP * np.median(bends))
-    much = much[np.argsort(bends[much], kind="stable")[-_MOST_KINKS:]]
+    much = much[np.argsort(bends[much], kind="stable")[-MOST_KINKS:]]
     return np.union1d(much, np.flatnonzero(gaps[:, 0] == 0.0) + 1)
 
 

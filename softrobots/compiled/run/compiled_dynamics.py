@@ -25,8 +25,8 @@ from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.starting import first_kick, first_state
 from softrobots.dynamics.step_control import order_of_steps
-from softrobots.dynamics.time_grid import grid_with_kicks, steps_and_rows
-from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
+from softrobots.dynamics.time_grid import grid_with_stops, steps_and_rows
+from softrobots.dynamics.time_inputs import MOST_KINKS, MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 
 _COMPARED = 401  # times at which tips of two runs are compared, besides those of the rows
@@ -100,7 +100,7 @@ class CompiledDynamics(CompiledStatics):
             return take_one(run, state, given, course, grid, times)
 
         if h is not None:
-            taken = take(grid_with_kicks(end, h, course.kicks))
+            taken = take(grid_with_stops(end, h, *course.breaks))
         else:
             taken = halve_to_tolerance(take, first_grid(rows, course.breaks, scheme), largest, scheme)
             facts["tip_error"] = None if taken.errors is None else float(taken.errors[0])
@@ -249,7 +249,8 @@ class CompiledDynamics(CompiledStatics):
             return take_batch(run, values, cases, spring_kicks, grid, times, threads)
 
         if h is not None:
-            taken = take(grid_with_kicks(end, h, cases.kicks))
+            few = sum(map(len, cases.breaks)) <= MOST_KINKS
+            taken = take(grid_with_stops(end, h, *(cases.breaks if few else [cases.kicks])))
         else:
             taken = halve_to_tolerance(take, first_grid(rows, cases.breaks, scheme), largest, scheme, cases.bad)
         found = taken.rows[:, np.searchsorted(times, rows)]

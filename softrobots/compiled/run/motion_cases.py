@@ -11,6 +11,7 @@ from softrobots.compiled.run.batches import batch_rows, unusable, without
 from softrobots.compiled.run.motion_course import SpringKicks, forces_of_steps, motors_of_steps
 from softrobots.compiled.run.results import EquilibriumBatch, MotionBatch
 from softrobots.core.checks import FloatArray
+from softrobots.dynamics.time_grid import SAME_TIME, merged_times
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.trajectory import Trajectory
@@ -29,6 +30,7 @@ class MotionCases:
             starts = starts.q_springs[:, -1], starts.velocities[:, -1]
         springs, rates = starts if isinstance(starts, tuple) and len(starts) == 2 else (starts, None)
         springs = springs.q_springs if isinstance(springs, EquilibriumBatch) else springs
+        self._end, self._apart = end, SAME_TIME * end
         self._paths = [MotorPath(model, one, end) for one in _moving(q_motors)]
         self._loads = [TimeLoad(model, one, None, end) for one in _moving(forces)]
         motors = model.relaxed_motors if self._paths else model.actuators.in_order(q_motors, "q_motors")
@@ -51,10 +53,9 @@ class MotionCases:
         """Elastic coordinates and rates at the start, each shape (n, n_springs)."""
 
     @property
-    def breaks(self) -> FloatArray:
-        """Times at which motors or forces of any case have a jump or a kink, shape (n,) [s]."""
-        found = [one.breaks for one in self._paths] + [one.breaks for one in self._loads]
-        return np.unique(np.concatenate([np.zeros(0), *found]))
+    def breaks(self) -> list[FloatArray]:
+        """Times at which velocities of motors jump, and then jumps and kinks of motors and of forces, each shape (n,) [s]."""
+        return [self.kicks, *(one.breaks for one in self._paths), *(one.breaks for one in self._loads)]
 
     @property
     def stand_still(self) -> bool:
@@ -64,14 +65,15 @@ class MotionCases:
     @property
     def kicks(self) -> FloatArray:
         """Times at which velocities of motors of any case jump, shape (n,) [s]."""
-        return np.unique([time for path in self._paths for time in path.kicks])
+        return merged_times(self._apart, self._end, *(path.kick_times for path in self._paths))[1:-1]
 
     def kick(self, spring_kicks: SpringKicks, time: float, rows: slice, unknowns: FloatArray, rates: FloatArray) -> None:
         """Let the rates of some cases, shape (n, N), jump where velocities of their motors do."""
         for place, case in enumerate(range(self.count)[rows] if self._paths else ()):
             path = self._paths[min(case, len(self._paths) - 1)]
-            if time in path.kicks and np.all(np.isfinite(unknowns[place])):
-                rates[place] += spring_kicks.at(path(time), unknowns[place], path.kicks[time])
+            changes = [change for at, change in path.kicks.items() if abs(at - time) <= self._apart]
+            if changes and np.all(np.isfinite(unknowns[place])):
+                rates[place] += spring_kicks.at(path(time), unknowns[place], changes[0])
 
     def motors(self, grid: FloatArray, rows: slice) -> FloatArray:
         """Return the motors of some cases, shape (n or 1, 2 n_steps + 1 or 1, n_motors); see `motors_of_steps`."""

@@ -84,14 +84,9 @@ class Course:
     """What springs do when velocities of motors jump."""
 
     @property
-    def kicks(self) -> FloatArray:
-        """Times at which velocities of motors jump, shape (n,) [s]."""
-        return np.array(list(self.path.kicks))
-
-    @property
-    def breaks(self) -> FloatArray:
-        """Times at which motors or force have a jump or a kink, shape (n,) [s]."""
-        return np.concatenate([self.path.breaks, self.load.breaks])
+    def breaks(self) -> tuple[FloatArray, ...]:
+        """Times at which velocities of motors jump, and then jumps and kinks of motors and of the force, each shape (n,) [s]."""
+        return self.path.kick_times, self.path.breaks, self.load.breaks
 
     def inputs_at(self, time: FloatArray, grid: FloatArray) -> dict[str, Any]:
         """Return the fields of a `Motion` with rows at given times, shape (n,) [s], that the steps of a grid do not compute."""

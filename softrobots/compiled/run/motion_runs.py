@@ -22,7 +22,7 @@ from softrobots.dynamics.midpoint import State, Step
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.recorder import Recorder
 from softrobots.dynamics.step_control import error_share, halved, rule_of_order
-from softrobots.dynamics.time_grid import grid_of_rows
+from softrobots.dynamics.time_grid import SAME_TIME, grid_of_rows, merged_times
 
 _FIRST_STEPS = 400  # of the first of the runs that are compared
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
@@ -55,12 +55,12 @@ class StepsTaken:
     """Whether that is within the tolerance; so are fixed steps."""
 
 
-def first_grid(rows: FloatArray, breaks: FloatArray, order: int) -> FloatArray:
+def first_grid(rows: FloatArray, breaks: Sequence[FloatArray], order: int) -> FloatArray:
     """Return the steps of the first of the runs that are compared, which end at `breaks`, or at the rows, shape (n,) [s]."""
     if order == GaussRule.order:
         return grid_of_rows(rows)
     end = float(rows[-1])
-    stops = np.unique([0.0, *(time for time in breaks.tolist() if 1e-9 * end < time < end * (1.0 - 1e-9)), end])
+    stops = merged_times(SAME_TIME * end, end, *breaks)
     ends = zip(stops[:-1], stops[1:], np.ceil(np.diff(stops) / end * _FIRST_STEPS).astype(int) + 1, strict=True)
     return np.append(np.concatenate([np.linspace(one, other, count)[:-1] for one, other, count in ends]), end)
 
@@ -104,7 +104,7 @@ def take_one(
     rows, status, interrupted = np.full((1, len(times), 2 * n + 3), np.nan), Status.CERTIFIED, False
     rows[0, 0] = np.concatenate([*state, np.zeros(3)])  # even if no step is taken
     try:
-        for first, end in itertools.pairwise(sorted({*_stops(grid, course.kicks), *range(0, last, _CHUNK)})):
+        for first, end in itertools.pairwise(sorted({*_stops(grid, course.path.kick_times), *range(0, last, _CHUNK)})):
             part, within = grid[first : end + 1], _times_within(times, grid, first, end)
             motors, forces = motors_of_steps(course.path, part), forces_of_steps(course.load, part)
             out = run.flat(rows[0, within])
