@@ -181,6 +181,24 @@ def test_swapped_axes_that_a_fitted_base_hides_are_told(axes: list[int], words: 
 
 
 @pytest.mark.study
+def test_reversed_actuators_that_other_parameters_hide_are_told() -> None:
+    """Two of six tendons are counted the other way; distances, azimuths and zeros make up for a part of it."""
+    arm, random = sr.load_model(sr.TendonArm(segment_lengths=(0.09, 0.11), elastic_sections=1)), np.random.default_rng(2)
+    moves = random.uniform(-2e-3, 2e-3, (40, 6))
+    tips = np.array([sr.solve_equilibrium(arm, arm.relaxed_motors + move).tip_position for move in moves])
+    seen = tips @ pin.exp3(np.array([0.1, 0.2, 1.0])).T + 5e-4 * random.standard_normal((40, 3))
+    spread = {"motor[*].offset": 1e-3, "tendon[*].tendon_distance": 1e-3, "tendon[*].tendon_azimuth_deviation": 0.3}
+    names = ("base.position", "base.rotation", *spread)
+    priors = {name: (4.5e-3 * name.endswith("distance"), std) for name, std in spread.items()}
+    for signs in ((1, 1, 1, 1, 1, 1), (1, 1, -1, 1, 1, 1)):
+        rows = sr.Measurements(arm.relaxed_motors + moves * signs, tip_position=seen, std=5e-4)
+        fit = sr.identify(arm, rows, names, priors=priors)
+        told = [text for text in hints(fit) if "taking the actuators as" in text]
+        assert len(told) == (min(signs) < 0), hints(fit)
+        assert all("as 1, 2, -3, 4, 5, 6 leaves" in text for text in told)
+
+
+@pytest.mark.study
 @pytest.mark.shortened(10, 200)
 def test_a_noisy_fit_is_not_called_mirrored(cases: int) -> None:
     """Noise of 10 to 30 % of the motion; every other arm has links of other lengths than those told."""

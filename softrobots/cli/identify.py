@@ -26,7 +26,7 @@ from softrobots.identification.identify import LOSSES, identify
 from softrobots.identification.measured_robot import frame_of
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
-from softrobots.identification.suspicions import doubtful_sizes
+from softrobots.identification.suspicions import doubtful_sizes, hints
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots.placed_robot import Marker, RobotPlacement
 from softrobots.view.figures.canvas import write_png
@@ -40,7 +40,7 @@ _EXAMPLES = """examples:
 --validate val.csv --loss soft_l1 -o fit/
   softrobots identify poses.csv --robot arm.urdf --fit joint[elbow].stiffness --prior joint[elbow].stiffness=40,10 \
 --hold-out 'day2_*'
-  softrobots identify poses.csv --robot pcc_arm --fit young_modulus --fit segment[*].young_modulus --families 'day[0-9]'
+  softrobots identify poses.csv --robot pcc_arm --fit bending_stiffness --fit segment[*].bending_stiffness --families 'day[0-9]'
 """
 
 _FILES = ("report.txt", "identification.json", "identification.npz", "predictions.csv", "robot.yaml", "page.html")
@@ -128,8 +128,10 @@ def run(arguments: argparse.Namespace) -> bool:
         if error.field != "parameters":
             raise
         raise ParameterError("--fit", error.value, error.requirement) from error
-    answer, lines = identification_answer(found, compared), identification_lines(found, compared)
-    files = [] if arguments.output is None else _write(arguments, found, compared, answer, lines)
+    files = [] if arguments.output is None else _write_fit(arguments, found)
+    causes = [] if found.message == INTERRUPTED else hints(found, progress=True)
+    answer, lines = identification_answer(found, compared, causes), identification_lines(found, compared, causes)
+    files += [] if arguments.output is None else _write_report(arguments, found, compared, answer, lines)
     if found.robot is not None and any(file.name == "robot.yaml" for file in files):
         lines += ["", f"as a robot: softrobots solve {arguments.output / 'robot.yaml'}"]
         kept = ("field", "base", "marker")
@@ -165,18 +167,10 @@ def _compare(
     return cross_validate(model, seen, sets, arguments.families, progress=True, **options)
 
 
-def _write(
-    arguments: argparse.Namespace,
-    found: Identification,
-    compared: CrossValidation | None,
-    answer: dict[str, Any],
-    lines: list[str],
-) -> list[Path]:
-    """Write the files of a fit; without matplotlib no pictures."""
+def _write_fit(arguments: argparse.Namespace, found: Identification) -> list[Path]:
+    """Write what a fit has found."""
     folder, overwrite = arguments.output, arguments.overwrite
     files = [
-        write_text(folder / "report.txt", "\n".join(lines) + "\n", overwrite=overwrite),
-        write_text(folder / "identification.json", json.dumps(plain(answer), indent=2) + "\n", overwrite=overwrite),
         save_result(found, folder / "identification.npz", overwrite=overwrite),
         write_text(folder / "predictions.csv", csv_text(*prediction_table(found)), overwrite=overwrite),
     ]
@@ -184,6 +178,22 @@ def _write(
     if name is not None:
         placement = placement_of(found).values()
         files.append(write_robot(folder / "robot.yaml", name, found.robot, placement, overwrite=overwrite))
+    return files
+
+
+def _write_report(
+    arguments: argparse.Namespace,
+    found: Identification,
+    compared: CrossValidation | None,
+    answer: dict[str, Any],
+    lines: list[str],
+) -> list[Path]:
+    """Write what is said of a fit; without matplotlib no pictures."""
+    folder, overwrite = arguments.output, arguments.overwrite
+    files = [
+        write_text(folder / "report.txt", "\n".join(lines) + "\n", overwrite=overwrite),
+        write_text(folder / "identification.json", json.dumps(plain(answer), indent=2) + "\n", overwrite=overwrite),
+    ]
     for draw in (_pictures, _page):
         try:
             files += draw(folder, found, compared, overwrite)

@@ -46,7 +46,7 @@ def grid_of_rows(rows: FloatArray) -> FloatArray:
 
 
 def grid_with_stops(end: float, step: float, *stops: FloatArray) -> FloatArray:
-    """Return the times of `time_grid`, with groups of stops in place of those a millionth of a step beside them, shape (n,) [s]."""
+    """Return the times of `time_grid`, with stops in place of those a millionth of a step beside them, shape (n,) [s]."""
     return merged_times(1e-6 * step, end, *stops, time_grid(end, step))
 
 

@@ -1,13 +1,15 @@
 """What a bad fit smells of: wrong units or frames, swapped or mirrored axes, shifted rows, commands of wrong sign or order.
 
 Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them. But
-where the rotation of the base is fitted, it hides most of a swapped axis, and other parameters hide more: then the robot is
-fitted again to the numbers with two axes swapped, or one mirrored, and told by a chi-square test.
+where the rotation of the base is fitted, it hides most of a swapped axis, and other parameters hide commands of wrong sign. Then
+slopes by commands are compared with those of the robot as it was given, and the whole fit is done again to the numbers with two
+axes swapped, or one mirrored, and told by a chi-square test.
 """
 
 from __future__ import annotations
 
 import contextlib
+import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -17,6 +19,7 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
+from softrobots.core.progress import with_progress
 from softrobots.identification.identification import Identification
 from softrobots.identification.identify import identify
 from softrobots.identification.measurements import Measurements
@@ -53,6 +56,7 @@ _MIRRORED = {
 }
 """Orders of axes that no turn makes; each is its own inverse."""
 _MOST_SOLVED = 50  # rows in which other frames are tried
+_MOST_REVERSED = 12  # actuators of which any may be reversed: so many bits are tried
 _SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; other parameters are not right yet either
 _MUCH = 0.1  # share of the variance that no robot with the right columns leaves
 _TO_STD = 1.4826  # standard deviation of normal numbers over the median of their size
@@ -60,8 +64,13 @@ _BADLY = 2.0  # times the standard deviation that was given, above which noise a
 _EARTH = (9.76, 9.84)  # gravity on the ground [m/s^2]
 
 
-def hints(found: Identification) -> list[str]:
-    """Return what may be wrong with the measurements of a fit, in plain sentences; see `suspicions`. Empty if nothing is."""
+def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
+    """Return what may be wrong with the measurements of a fit, in plain sentences; see `suspicions`. Empty if nothing is.
+
+    Args:
+        found: The fit.
+        progress: Whether to show a bar where fits are tried, or its label.
+    """
     rows = found.fitted.measurements
     texts: list[str] = []
     few = slice(None, None, -(-len(rows) // _MOST_SOLVED))
@@ -70,7 +79,8 @@ def hints(found: Identification) -> list[str]:
         texts += suspicions(measured, predicted, rows.q_motors, name=key)
         if key.startswith(("positions.", "poses.")) and _unexplained(measured, predicted) > UNEXPLAINED:
             texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
-            texts += _other_axes(found, key, few) if len(texts) == before else []
+            texts += _reversed_actuators(found, key, few) if len(texts) == before else []
+            texts += _other_axes(found, key, few, progress) if len(texts) == before else []
         if len(texts) == before and (share := _unexplained(measured, predicted)) > _MUCH:
             texts.append(
                 f"{key}: {100.0 * share:.2g} % of the variance are left unexplained: are order and signs of the actuators "
@@ -180,7 +190,36 @@ def _other_frame(found: Identification, key: str, rows: Measurements, before: fl
     return [f"{key}: taking it for the frame {best} {_words(shares[best], before)}"]
 
 
-def _other_axes(found: Identification, key: str, few: slice) -> list[str]:
+def _reversed_actuators(found: Identification, key: str, few: slice) -> list[str]:
+    """The actuators whose reversal explains far more of positions, if any are: what else is fitted hides them.
+
+    Slopes `M` by commands are compared with those of the robot as it was given, `P`, whatever turn `R` the base has: over signs
+    `S`, :math:`|M - R P S|^2` is least where the sum of singular values of :math:`P S M^T` is largest (Wahba 1965).
+    """
+    rows, base = found.fitted.measurements[few], [name for name in found.names if name.startswith("base.")]
+    if not base:
+        return []
+    fit = identify(found.model, rows, ParameterSet.of(found.model, base, rows.markers), max_iterations=_STEPS)
+    measured, predicted = _points(rows.measured[key]), _points(fit.fitted.predicted[key])
+    known = np.isfinite(measured).all(axis=1) & np.isfinite(predicted).all(axis=1)
+    q, n = _centred(rows.q_motors[known]), rows.q_motors.shape[1]
+    if not 2 * n < len(q) or n > _MOST_REVERSED or np.linalg.matrix_rank(q) < n:
+        return []
+    root = np.linalg.cholesky(q.T @ q).T
+    slopes, expected = (np.linalg.lstsq(q, _centred(values[known]), rcond=None)[0].T for values in (measured, predicted))
+    signs = np.array(sorted(itertools.product((1.0, -1.0), repeat=n), key=sum, reverse=True))
+    turned, sizes, back = np.linalg.svd(slopes @ root.T @ ((expected * signs[:, None]) @ root.T).transpose(0, 2, 1))
+    sizes[:, 2] *= np.linalg.det(turned @ back)
+    whole = np.sum((slopes @ root.T) ** 2)
+    shares = (whole + np.sum(((expected * signs[:, None]) @ root.T) ** 2, axis=(1, 2)) - 2.0 * sizes.sum(axis=1)) / whole
+    best = int(np.argmax(shares <= shares.min() + 0.1 * UNEXPLAINED))  # of nearly equal ones that with the fewest
+    if not (shares[0] > UNEXPLAINED and shares[best] < FAR_LESS * shares[0]):
+        return []
+    order = ", ".join(str(int(number * sign)) for number, sign in enumerate(signs[best], start=1))
+    return [f"{key}: taking the actuators as {order} {_words(shares[best], shares[0])} that follows them"]
+
+
+def _other_axes(found: Identification, key: str, few: slice, progress: bool | str) -> list[str]:
     """The swap of two axes, or the mirrored axis, of positions with which a fit with a free base leaves far less, if any does.
 
     With the sum of squares `S` of `n` numbers and `P` parameters, :math:`(n - P) (S - S') / S'` is the gain in variances.
@@ -192,7 +231,8 @@ def _other_axes(found: Identification, key: str, few: slice) -> list[str]:
     freedoms = np.count_nonzero(np.isfinite(found.residuals[key][few])) - len(found.names)
     left, names = dict[str, float](), ParameterSet.of(found.model, found.names, rows.markers)
     options: dict[str, Any] = {"priors": found.priors, "loss": found.loss, "max_iterations": _STEPS}
-    for words, change in _MIRRORED.items():
+    tried = with_progress(_MIRRORED.items(), progress, label=f"axes of {key}", unit="fit")
+    for words, change in tried:
         given = rows.arguments()
         given["positions"] |= {key.partition(".")[2]: rows.measured[key] @ np.array(change)}
         with contextlib.suppress(SoftRobotsError):

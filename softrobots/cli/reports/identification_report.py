@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -10,11 +10,10 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.identification.cross_validation import CrossValidation
 from softrobots.identification.identification import UNITS, Comparison, Identification
-from softrobots.identification.suspicions import hints
 
 
-def identification_answer(found: Identification, compared: CrossValidation | None) -> dict[str, Any]:
-    """A fit by names of the library, and the comparison of sets of parameters, if there is one."""
+def identification_answer(found: Identification, compared: CrossValidation | None, causes: Sequence[str]) -> dict[str, Any]:
+    """A fit by names of the library, with a comparison of sets of parameters, if there is one, and what may be wrong."""
     blocks = found.block_intervals
     rows = found.fitted.measurements
     return {
@@ -39,19 +38,19 @@ def identification_answer(found: Identification, compared: CrossValidation | Non
         "outliers": [rows.where(row) for row in found.outliers],
         "unidentifiable": found.unidentifiable,
         "held": found.held,
-        "hints": hints(found),
+        "hints": causes,
         "springs": _springs(found),
         "cross_validation": None if compared is None else _compared(compared),
     }
 
 
-def identification_lines(found: Identification, compared: CrossValidation | None) -> list[str]:
+def identification_lines(found: Identification, compared: CrossValidation | None, causes: Sequence[str]) -> list[str]:
     """The same for a person."""
     lines = found.summary(None).split("\n")
     for title, one in (("fitted", found.fitted), ("kept aside", found.validation)):
         about_mean = {} if one is None else _about_mean(one)
         lines += [f"{key}, without the mean of {title} rows: {error:.4g} m" for key, error in about_mean.items()]
-    lines += [f"hint: {text}" for text in hints(found)]
+    lines += [f"hint: {text}" for text in causes]
     if found.robot is None:
         words = (f"--spring {joint}={stiffness:.6g},{rest:.6g}" for joint, (stiffness, rest) in _springs(found).items())
         lines += ["", f"its springs, as options of other commands: {' '.join(words)}"]

@@ -85,7 +85,7 @@ class Course:
 
     @property
     def breaks(self) -> tuple[FloatArray, ...]:
-        """Times at which velocities of motors jump, and then jumps and kinks of motors and of the force, each shape (n,) [s]."""
+        """Times at which velocities of motors jump, then jumps and kinks of motors and of the force, each shape (n,) [s]."""
         return self.path.kick_times, self.path.breaks, self.load.breaks
 
     def inputs_at(self, time: FloatArray, grid: FloatArray) -> dict[str, Any]:
