@@ -12,6 +12,7 @@ from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
+from softrobots.environment.single_bodies import Seen
 from softrobots.environment.single_pairs import single_pair
 
 _NOBODY = np.zeros(0, dtype=np.intp)
@@ -60,7 +61,6 @@ def find_candidates(
         The candidates.
     """
     ends = places.ends.reshape(-1, 3).take(cores.single_ends, 0)
-    limits, ways = margin + cores.radii, 2.0 * margin + cores.ways
     found: list[Candidates] = []
     for field, numbers in fields:
         if len(ends) * len(numbers) <= _FEW and field.single(0) is not None:
@@ -68,7 +68,7 @@ def find_candidates(
             if len(new.capsules):
                 found.append(new._replace(obstacles=numbers.take(new.obstacles)))
             continue
-        distances = field.at_least(ends)
+        distances, limits = field.at_least(ends), margin + cores.radii
         standing = _standing(field, cores, ends, distances) if len(cores.at_base) else None
         if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
             touching = distances <= limits.take(cores.end_capsules)[:, None]
@@ -81,7 +81,9 @@ def find_candidates(
             new = Candidates([(field, which)], capsules, which, features, ends.take(near, 0), values, normals)
         else:
             # the distance changes by at most the length of the way: what is far at both ends is far between them
-            near, which = (np.add.reduce(distances.take(cores.end_numbers, 0), 1) <= ways[:, None]).nonzero()
+            near, which = (
+                np.add.reduce(distances.take(cores.end_numbers, 0), 1) <= (2.0 * margin + cores.ways)[:, None]
+            ).nonzero()
             if not len(near):
                 continue
             counted = cores.counted.take(near, 0)
@@ -91,7 +93,7 @@ def find_candidates(
         if len(new.capsules):
             found.append(Candidates(new.parts, new.capsules, numbers.take(new.obstacles), *new[3:]))
     if pairs is not None:
-        found.append(_own(cores, places, pairs, limits, margin, merged, sum(len(numbers) for _, numbers in fields)))
+        found.append(_own(cores, places, pairs, margin, merged, sum(len(numbers) for _, numbers in fields)))
     if len(found) == 1:
         return found[0]
     if not found:
@@ -117,21 +119,25 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
 def _few(field: Field, cores: Cores, ends: Any, count: int, margin: float, merged: float) -> Candidates:
     """The same for few ends, a list of points, and the `count` bodies of a field, in plain numbers."""
     bodies: list[Any] = [field.single(number) for number in range(count)]
-    table = [[body.seen(end) for body in bodies] for end in ends]
-    keys, rows = list[tuple[int, int, int]](), list[tuple[float, ...]]()
-    for capsule, (numbers, counted, radius, length) in enumerate(cores.plain):
-        (x, y, z), (u, v, w) = start, end = ends[numbers[0]], ends[numbers[1]]
+    bounds = [[math.dist(end, body.centre) - body.around for body in bodies] for end in ends]
+    seen, keys, rows = dict[tuple[int, int], Seen](), list[tuple[int, int, int]](), list[tuple[float, ...]]()
+    for capsule, ((start, end), counted, radius, length) in enumerate(cores.plain):
         limit = margin + radius
-        for which, (body, first, last) in enumerate(zip(bodies, table[numbers[0]], table[numbers[1]], strict=True)):
-            if first.distance + last.distance > 2.0 * limit + length:
+        for which, (body, first, last) in enumerate(zip(bodies, bounds[start], bounds[end], strict=True)):
+            if first + last > 2.0 * limit + length:
                 continue
-            for feature, share, distance, normal in single_pair(body, first, last, length, limit, merged):
+            for number in (start, end):
+                if (number, which) not in seen:
+                    seen[number, which] = body.seen(ends[number])
+            (x, y, z), (u, v, w) = both = ends[start], ends[end]
+            pair = seen[start, which], seen[end, which]
+            for feature, share, distance, normal in single_pair(body, *pair, length, limit, merged):
                 if feature >= INSIDE:
                     point = x + share * (u - x), y + share * (v - y), z + share * (w - z)
                 elif distance <= limit and counted[feature]:
-                    point = end if feature else start
-                    base, near = cores.base_of.get(numbers[feature], (0, -math.inf))
-                    if table[base][which].distance < near:  # it stands there
+                    point = both[feature]
+                    base, near = cores.base_of.get((start, end)[feature], (0, -math.inf))
+                    if near > -math.inf and body.seen(ends[base]).distance < near:  # it stands there
                         continue
                 else:
                     continue
@@ -163,13 +169,11 @@ def _near(
     return Candidates([(field, columns[1])], *columns)
 
 
-def _own(
-    cores: Cores, places: CorePlaces, pairs: Any, limits: FloatArray, margin: float, merged: float, count: int
-) -> Candidates:
+def _own(cores: Cores, places: CorePlaces, pairs: Any, margin: float, merged: float, count: int) -> Candidates:
     """Candidates between the robot's own capsules, which are obstacles after the `count` of the environment."""
     field = own_capsules(cores, places)
     near = near_pairs(cores, places, pairs, margin)
-    found = _near(field, places, near[:, 0], near[:, 1], np.True_, limits, merged)
+    found = _near(field, places, near[:, 0], near[:, 1], np.True_, margin + cores.radii, merged)
     ends = (found.features < INSIDE).nonzero()[0]
     numbers = cores.end_numbers[found.capsules[ends], found.features[ends]]
     found.capsules[ends], found.features[ends] = cores.end_capsules[numbers], cores.end_features[numbers]

@@ -50,8 +50,6 @@ class Cores:
         ends = np.array([[one.start, one.end] for one in self.capsules]).reshape(-1, 2, 3)
         self._local = np.concatenate([ends, np.ones((self.count, 2, 1))], axis=2)
         nothing = read_only(np.zeros((0, self._model.nv)))
-        self.no_rows = nothing, read_only(np.zeros(0))
-        """No row over the joints, shape (0, nv), and its weights."""
         self.no_load = JointLoad(read_only(np.zeros(self._model.nv)), nothing, nothing, None, None, 0.0, 0.0)
         """No load on the joints."""
         self.moves = self._motion()

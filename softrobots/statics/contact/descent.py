@@ -77,8 +77,8 @@ class ContactSearch:
         touch = state.touch
         if touch is None or not math.isfinite(state.energy):
             return None
-        pressed = touch.forces.nonzero()[0] if forces.entries else ()
-        gap = max(touch.penetration, *touch.gaps.values.take(pressed).tolist()) if len(pressed) else touch.penetration
+        pressed = touch.gaps.values.take(touch.forces.nonzero()[0])
+        gap = max(touch.penetration, *pressed.tolist()) if len(pressed) else touch.penetration
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
         error = max(state.error / allowed, gap / (_EXACT * self._reach))
         return Near(state, touch, error, seen, state.residual + touch.forces.dot(touch.rows))
@@ -105,23 +105,15 @@ class ContactSearch:
         return here, False
 
     def step(self, here: Near) -> Step | None:
-        """Step of the quadratic programme over the gaps that it can close."""
-        touch, values = here.touch, here.touch.gaps.values
-        sizes = np.sqrt(np.vecdot(touch.rows, touch.rows))
-        near = (values <= _LARGEST_STEP * sizes).nonzero()[0]
-        rows, held, tangent = touch.rows.take(near, 0), touch.forces.take(near) > 0.0, here.state.tangent
-        limits, gaps = (_LARGEST_STEP, self._damping), values.take(near)
-        found = contact_step(tangent, here.load, gaps, rows, held, self._soft, limits, self._factors)
-        forces = np.zeros(len(values))
-        if found is not None and found.forces.any() and not held.any():  # the first forces: how they soften counts, too
-            forces[near] = found.forces
-            tangent = tangent - contact_softening(here.state, forces)
-            first, held = found, found.forces > 0.0
-            found = contact_step(tangent, here.load, gaps, rows, held, self._soft, limits, self._factors) or first
-        if found is None:
-            return None
-        forces[near] = found.forces
-        return Step(found.step, forces, found.exact)
+        """Step of the quadratic programme over the gaps that are seen."""
+        touch, tangent, limits = here.touch, here.state.tangent, (_LARGEST_STEP, self._damping)
+        gaps, held = touch.gaps.values, touch.forces > 0.0
+        found = contact_step(tangent, here.load, gaps, touch.rows, held, self._soft, limits, self._factors)
+        if found is None or held.any() or not found.forces.any():
+            return found
+        tangent = tangent - contact_softening(here.state, found.forces)  # the first forces: how they soften counts, too
+        held = found.forces > 0.0
+        return contact_step(tangent, here.load, gaps, touch.rows, held, self._soft, limits, self._factors) or found
 
     def repaired(self, here: Near) -> Near:
         """Bring a robot that starts deep inside of obstacles towards their surface, bending it little."""
