@@ -24,12 +24,15 @@ class CorePlaces(NamedTuple):
 
     ends: FloatArray
     """Start and end of each core, shape (n, 2, 3) [m]."""
-    spans: FloatArray
-    """From start to end, shape (n, 3) [m]."""
     jacobian: FloatArray
     """Velocity of the point of a body at the world's origin, then angular, per joint rate, shape (6, nv)."""
     placements: FloatArray
     """Transforms of the joints that carry capsules to the world, shape (k, 4, 4)."""
+
+    @property
+    def spans(self) -> FloatArray:
+        """From start to end of each core, shape (n, 3) [m]."""
+        return np.asarray(self.ends[:, 1] - self.ends[:, 0])
 
 
 class Cores:
@@ -83,7 +86,7 @@ class Cores:
         placements = self._data.oMi
         transforms = np.array([placements[number].homogeneous for number in self._numbers])
         ends = (self._local @ transforms.take(self.carrier, 0).swapaxes(1, 2))[:, :, :3]
-        return CorePlaces(ends, ends[:, 1] - ends[:, 0], jacobian, transforms)
+        return CorePlaces(ends, jacobian, transforms)
 
     def _motion(self) -> FloatArray:
         joints = self._model.joints

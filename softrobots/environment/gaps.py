@@ -31,11 +31,7 @@ from softrobots.environment.single_bodies import Bends, inner, times
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
 
-_TURNS = [
-    (0.0, 0.0, 0.0, 1.0, 0.0, 0.0),
-    (0.0, 0.0, 0.0, 0.0, 1.0, 0.0),
-    (0.0, 0.0, 0.0, 0.0, 0.0, 1.0),
-]  # rows of angular velocity
+_TURNS = tuple(np.eye(3, 6, 3).ravel().tolist())  # rows of the angular velocity
 
 
 class MaterialPoints(NamedTuple):
@@ -129,7 +125,12 @@ class Gaps:
         if not len(rows):
             return self._cores.no_load
         count, loads, points = len(self._transforms), list[Any](), (self.core_points if normal else self.points).tolist()
-        angular, by_force, owners, own = list[Any](), list[Any](), list[int](), list[int]()
+        angular, by_force, owners, own = (
+            list[float](),
+            list[float](),
+            list[int](),
+            list[int](),
+        )  # rows of six, one after another
         for row in rows.tolist():
             capsule, other, _ = self.keys[row]
             force = (forces[row] * self.normals[row] if normal else forces[row]).tolist()
@@ -140,21 +141,22 @@ class Gaps:
                 loads.append((other - count, [-one for one in force], point.tolist()))
                 own.append(row)
             elif normal:
-                for wrench, weight in self._curved(row):
-                    by_force.append(wrench)
-                    angular.append([float(forces[row]) * weight * one for one in wrench])
+                for wrench, weight in self._curved(row, float(forces[row])):
+                    by_force += wrench
+                    angular += [weight * one for one in wrench]
                     owners.append(capsule)
         potential, size = 0.0, 0.0
         for capsule, v, p in loads:
             (x, y, z), (a, b, c), work = v, p, inner(v, p)
-            by_force.append((0.0, z, -y, a * x - work, a * y, a * z))  # three rows of -v x (u - p x w)
-            by_force.append((-z, 0.0, x, b * x, b * y - work, b * z))
-            by_force.append((y, -x, 0.0, c * x, c * y, c * z - work))
+            by_force += (0.0, z, -y, a * x - work, a * y, a * z)  # three rows of -v x (u - p x w)
+            by_force += (-z, 0.0, x, b * x, b * y - work, b * z)
+            by_force += (y, -x, 0.0, c * x, c * y, c * z - work)
             angular += _TURNS
-            owners += [capsule] * 3
+            owners += (capsule, capsule, capsule)
             potential, size = potential - work, size + math.hypot(x, y, z)
         jacobian, moves = self.places.jacobian, self._cores.moves
-        factors = np.array(angular + by_force).dot(jacobian).reshape(2, -1, jacobian.shape[1]) * moves.take(owners, 0)
+        products = np.array(angular + by_force).reshape(-1, 6).dot(jacobian)
+        factors = products.reshape(2, len(owners), -1) * moves.take(owners, 0)
         if normal:
             torque = forces.dot(self.jacobian)
         else:
@@ -172,11 +174,11 @@ class Gaps:
             scale=self.reach * size,
         )
 
-    def _curved(self, row: int) -> list[tuple[Any, float]]:
-        r"""What the second derivative of a gap from an obstacle has beside that of a dead force.
+    def _curved(self, row: int, force: float) -> list[tuple[Any, float]]:
+        r"""What the derivative of a normal force [N] of an obstacle has beside that of a dead one.
 
         Returns:
-            Wrenches, force first, and weights `w` [1/m]: it is :math:`\sum w\,a^T a` with the torques `a` of the wrenches.
+            Wrenches, force first, and weights `w` [N/m]: it is :math:`\sum w\,a^T a` with the torques `a` of the wrenches.
         """
         place, parts = row, iter(self.parts)
         field, which = next(parts)
@@ -186,7 +188,7 @@ class Gaps:
         if isinstance(field, HalfSpaces):
             return []
         point, bends = self.core_points[row].tolist(), self.bends(field, int(which[place]), row)
-        found: list[tuple[Any, float]] = [((*way, *times(point, way)), weight) for way, weight in bends]
+        found: list[tuple[Any, float]] = [((*way, *times(point, way)), force * weight) for way, weight in bends]
         if bends and self.features[row] == INSIDE:
             span: Any = self.places.spans[self.capsules[row]].tolist()
             shares = [weight * inner(way, span) for way, weight in bends]
@@ -194,7 +196,7 @@ class Gaps:
             bend = inner((x, y, z), span)
             if bend > 0.0:
                 (a, b, c), (d, e, f) = times(point, (x, y, z)), times(span, self.normals[row].tolist())
-                found.append(((x, y, z, a + d, b + e, c + f), -1.0 / bend))
+                found.append(((x, y, z, a + d, b + e, c + f), -force / bend))
         return found
 
     def bends(self, field: Field, number: int, row: int) -> Bends:
@@ -204,7 +206,7 @@ class Gaps:
         return field.bends(number, point, float(self.distances[row]), normal)
 
     def _curved_by_itself(self, rows: Any, forces: FloatArray) -> FloatArray:
-        """The same of candidates of the robot with itself, times forces, as factors of a derivative, shape (2, k, nv)."""
+        """The same of candidates of the robot with itself, as factors of a derivative, shape (2, k, nv)."""
         found, weights = list[FloatArray](), list[float]()
         for row in rows:
             pair = int(self.capsules[row]), int(self.obstacles[row]) - len(self._transforms)

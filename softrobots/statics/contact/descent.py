@@ -109,7 +109,7 @@ class ContactSearch:
         touch, tangent, limits = here.touch, here.state.tangent, (_LARGEST_STEP, self._damping)
         gaps, held = touch.gaps.values, touch.forces > 0.0
         found = contact_step(tangent, here.load, gaps, touch.rows, held, self._soft, limits, self._factors)
-        if found is None or held.any() or not found.forces.any():
+        if found is None or np.count_nonzero(held) or not np.count_nonzero(found.forces):
             return found
         tangent = tangent - contact_softening(here.state, found.forces)  # the first forces: how they soften counts, too
         held = found.forces > 0.0
@@ -170,8 +170,8 @@ class ContactSearch:
             whole, change = whole * (_LARGEST_STEP / length), change * (_LARGEST_STEP / length)
         deep = touch.penetration
         closes = deep - max(0.0, -float((touch.gaps.values + touch.rows @ whole).min())) if deep > 0.0 else 0.0
-        downhill = float(here.load @ whole)
-        pressed, least = 2.0 * float(step.forces.sum()), 2.0 * downhill / closes if closes > 0.0 else 0.0
+        downhill = float(here.load.dot(whole))
+        pressed, least = 2.0 * float(np.add.reduce(step.forces)), 2.0 * downhill / closes if closes > 0.0 else 0.0
         price = max(pressed, 0.5 * self._price, least)
         predicted, self._price = downhill - price * closes, price
         rounding = self.problem.rounding(state) + 1e-15 * price * self._reach

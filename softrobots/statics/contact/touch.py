@@ -116,7 +116,7 @@ class NearSurfaces:
         gaps = self._surroundings.at(q, near * self._reach)
         on_motors, on_springs = point.columns(gaps.jacobian)
         each = forces.at(gaps)
-        deepest = max(0.0, -float(np.minimum.reduce(gaps.values))) if len(gaps.values) else 0.0
+        deepest = max(0.0, -min(gaps.values.tolist(), default=0.0))
         return Touch(gaps, on_springs, on_motors, each, gaps.load(each), self._surroundings, deepest)
 
 
