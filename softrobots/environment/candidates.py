@@ -64,9 +64,7 @@ def find_candidates(
     found: list[Candidates] = []
     for field, numbers in fields:
         if len(ends) * len(numbers) <= _FEW and field.single(0) is not None:
-            new = _few(field, cores, ends.tolist(), len(numbers), margin, merged)
-            if len(new.capsules):
-                found.append(new._replace(obstacles=numbers.take(new.obstacles)))
+            found += _few(field, numbers, cores, ends.tolist(), margin, merged)
             continue
         distances, limits = field.at_least(ends), margin + cores.radii
         standing = _standing(field, cores, ends, distances) if len(cores.at_base) else None
@@ -116,37 +114,40 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
     return standing
 
 
-def _few(field: Field, cores: Cores, ends: Any, count: int, margin: float, merged: float) -> Candidates:
-    """The same for few ends, a list of points, and the `count` bodies of a field, in plain numbers."""
-    bodies: list[Any] = [field.single(number) for number in range(count)]
-    bounds = [[math.dist(end, body.centre) - body.around for body in bodies] for end in ends]
-    seen, keys, rows = dict[tuple[int, int], Seen](), list[tuple[int, int, int]](), list[tuple[float, ...]]()
-    for capsule, ((start, end), counted, radius, length) in enumerate(cores.plain):
-        limit = margin + radius
-        for which, (body, first, last) in enumerate(zip(bodies, bounds[start], bounds[end], strict=True)):
-            if first + last > 2.0 * limit + length:
+def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, merged: float) -> list[Candidates]:
+    """The same for few ends, a list of points, and the bodies of a field, with their numbers, in plain numbers; or nothing."""
+    keys, rows = list[tuple[int, int, int]](), list[tuple[float, ...]]()
+    for which in range(len(numbers)):
+        body: Any = field.single(which)
+        bounds, seen = [math.dist(end, body.centre) - body.around for end in ends], dict[int, Seen]()
+        for capsule, (both, counted, radius, length) in enumerate(cores.plain):
+            limit, (first, last) = margin + radius, both
+            if bounds[first] + bounds[last] > 2.0 * limit + length:
                 continue
-            for number in (start, end):
-                if (number, which) not in seen:
-                    seen[number, which] = body.seen(ends[number])
-            (x, y, z), (u, v, w) = both = ends[start], ends[end]
-            pair = seen[start, which], seen[end, which]
-            for feature, share, distance, normal in single_pair(body, *pair, length, limit, merged):
+            for number in both:
+                if number not in seen:
+                    seen[number] = body.seen(ends[number])
+            start, end = seen[first], seen[last]
+            if start.distance + end.distance > 2.0 * limit + length:
+                continue
+            for feature, share, distance, normal in single_pair(body, start, end, length, limit, merged):
                 if feature >= INSIDE:
+                    (x, y, z), (u, v, w) = ends[first], ends[last]
                     point = x + share * (u - x), y + share * (v - y), z + share * (w - z)
                 elif distance <= limit and counted[feature]:
-                    point = both[feature]
-                    base, near = cores.base_of.get((start, end)[feature], (0, -math.inf))
-                    if near > -math.inf and body.seen(ends[base]).distance < near:  # it stands there
+                    point = ends[both[feature]]
+                    base = cores.base_of.get(both[feature])
+                    if base is not None and body.seen(ends[base[0]]).distance < base[1]:  # it stands there
                         continue
                 else:
                     continue
                 keys.append((capsule, which, feature))
                 rows.append((*point, distance, *body.out(normal)))
     if not rows:
-        return NOTHING
+        return []
     (capsules, others, features), found = np.array(keys).T, np.array(rows)
-    return Candidates([(field, others)], capsules, others, features, found[:, :3], found[:, 3], found[:, 4:])
+    columns = numbers.take(others), features, found[:, :3], found[:, 3], found[:, 4:]
+    return [Candidates([(field, others)], capsules, *columns)]
 
 
 def _near(

@@ -65,11 +65,11 @@ def solve_guessed(
     if forces is None or min(forces.tolist()) < 0.0:
         return None
     solution, multipliers[chosen] = free + gives.dot(forces), forces
-    if len(chosen) == len(bounds):
-        return solution, multipliers
-    broken = gradients.dot(solution) - bounds < -_BROKEN * np.sqrt(np.vecdot(gradients, gradients))
-    broken[chosen] = False
-    return None if broken.any() else (solution, multipliers)
+    lacking = bounds - gradients.dot(solution)
+    lacking[chosen] = 0.0
+    if max(lacking.tolist()) > 0.0 and (lacking > _BROKEN * np.sqrt(np.vecdot(gradients, gradients))).any():
+        return None
+    return solution, multipliers
 
 
 def _independent(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
