@@ -168,44 +168,50 @@ class ContactSearch:
         whole, change = step.step, step.forces - touch.forces
         if length > _LARGEST_STEP:
             whole, change = whole * (_LARGEST_STEP / length), change * (_LARGEST_STEP / length)
-        deep = touch.penetration
+        deep, first, share = touch.penetration, self.spent, 1.0
+        deepest = max(deep, _DEEP * self._reach)
+        seen = min(NEAR, max(_LEAST_SEEN, 2.0 * _moved(whole)))  # steps shrink: what the next one may touch
+        table = ForceTable.of(touch.gaps, touch.forces + change)
+        trial = self.near(state.q_springs + whole, table, seen)
+        self._price = max(2.0 * float(np.add.reduce(step.forces)), 0.5 * self._price)
+        exact = step.exact and length <= _LARGEST_STEP and trial is not None and trial.touch.penetration <= deepest
+        if trial is not None and exact and trial.error <= 0.5 * here.error:
+            self._damp(False)
+            return trial
         closes = deep - max(0.0, -float((touch.gaps.values + touch.rows @ whole).min())) if deep > 0.0 else 0.0
-        downhill = float(here.load.dot(whole))
-        pressed, least = 2.0 * float(np.add.reduce(step.forces)), 2.0 * downhill / closes if closes > 0.0 else 0.0
-        price = max(pressed, 0.5 * self._price, least)
-        predicted, self._price = downhill - price * closes, price
+        downhill = float(here.load @ whole)
+        price = self._price = max(self._price, 2.0 * downhill / closes if closes > 0.0 else 0.0)
+        predicted = downhill - price * closes
         rounding = self.problem.rounding(state) + 1e-15 * price * self._reach
         if predicted > -rounding:
             predicted = min(0.0, 0.5 * float(whole @ state.tangent @ whole))
         below = predicted > -rounding  # rounding of the energy: it says nothing, the error must shrink
-        exact = step.exact and length <= _LARGEST_STEP
 
         def better(trial: Near | None, share: float) -> bool:
-            if trial is None or trial.touch.penetration > max(deep, _DEEP * self._reach):
+            if trial is None or trial.touch.penetration > deepest:
                 return False
-            if below or (exact and share == 1.0 and trial.error <= 0.5 * here.error):
+            if below:
                 return BALANCED < here.error > trial.error
             merit = trial.state.energy + price * trial.touch.penetration
             return merit <= state.energy + price * deep + _ARMIJO * share * predicted + rounding
 
-        share, first = 1.0, self.spent
-        seen = min(NEAR, max(_LEAST_SEEN, 2.0 * _moved(whole)))  # steps shrink: what the next one may touch
-        while self.spent < self.most and share > _SHORTEST:
+        if trial is not None and not better(trial, share):
+            back = _back_to_surface(trial.touch, self._soft)
+            if back is not None and norm(back) <= norm(whole):
+                trial = self.near(trial.state.q_springs + back, table, seen)
+        while not better(trial, share):
+            share *= 0.5
+            if below or self.spent >= self.most or share <= _SHORTEST:
+                return None
             table = ForceTable.of(touch.gaps, touch.forces + share * change)
             trial = self.near(state.q_springs + share * whole, table, seen)
-            if share == 1.0 and trial is not None and not better(trial, share):
-                back = _back_to_surface(trial.touch, self._soft)
-                if back is not None and norm(back) <= norm(whole):
-                    trial = self.near(trial.state.q_springs + back, table, seen)
-            if trial is not None and better(trial, share):
-                cut = self.spent > first + 2
-                self._damping = _LEAST_DAMPING + 4.0 * self._damping if cut else 0.25 * self._damping
-                self._damping *= self._damping >= _LEAST_DAMPING
-                return trial
-            if below:
-                break
-            share *= 0.5
-        return None
+        self._damp(self.spent > first + 2)
+        return trial
+
+    def _damp(self, cut: bool) -> None:
+        """Damp the next step more after one that was cut, else less."""
+        self._damping = _LEAST_DAMPING + 4.0 * self._damping if cut else 0.25 * self._damping
+        self._damping *= self._damping >= _LEAST_DAMPING
 
 
 def _moved(step: FloatArray) -> float:
