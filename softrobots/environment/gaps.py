@@ -23,11 +23,11 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import skew
 from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
 from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores, cores_of
-from softrobots.environment.distance_fields import Field, HalfSpaces
+from softrobots.environment.distance_fields import HalfSpaces
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
 from softrobots.environment.self_contact import relative_curvature, self_contact_pairs
-from softrobots.environment.single_bodies import Bends, inner, times
+from softrobots.environment.single_bodies import inner, times
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
 
@@ -77,8 +77,8 @@ class Gaps:
         if own:
             rows = (found.obstacles >= len(transforms)).nonzero()[0]
             self.moves[rows] -= cores.moves[found.obstacles[rows] - len(transforms)]
-        normals = zip(found.normals.tolist(), found.points.tolist(), strict=True)
-        wrenches = np.array([(*normal, *times(point, normal)) for normal, point in normals]).reshape(-1, 6)
+        self._plain = found.points.tolist(), found.normals.tolist()
+        wrenches = np.array([(*n, *times(point, n)) for point, n in zip(*self._plain, strict=True)]).reshape(-1, 6)
         self.jacobian: FloatArray = wrenches.dot(places.jacobian) * self.moves
         """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
 
@@ -124,16 +124,13 @@ class Gaps:
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
             return self._cores.no_load
-        count, loads, points = len(self._transforms), list[Any](), (self.core_points if normal else self.points).tolist()
-        angular, by_force, owners, own = (
-            list[float](),
-            list[float](),
-            list[int](),
-            list[int](),
-        )  # rows of six, one after another
+        count, loads, (points, normals) = len(self._transforms), list[Any](), self._plain
+        points = points if normal else self.points.tolist()
+        angular, by_force, owners, own = list[float](), list[float](), list[int](), list[int]()  # rows of six, joined
+        values = forces.tolist()
         for row in rows.tolist():
             capsule, other, _ = self.keys[row]
-            force = (forces[row] * self.normals[row] if normal else forces[row]).tolist()
+            force = [values[row] * one for one in normals[row]] if normal else values[row]
             loads.append((capsule, force, points[row]))
             if other >= count:  # the other capsule takes the opposite force
                 depth = float(self._cores.radii[other - count]) if normal else 0.0
@@ -141,7 +138,7 @@ class Gaps:
                 loads.append((other - count, [-one for one in force], point.tolist()))
                 own.append(row)
             elif normal:
-                for wrench, weight in self._curved(row, float(forces[row])):
+                for wrench, weight in self._curved(row, values[row], points[row], normals[row]):
                     by_force += wrench
                     angular += [weight * one for one in wrench]
                     owners.append(capsule)
@@ -174,7 +171,7 @@ class Gaps:
             scale=self.reach * size,
         )
 
-    def _curved(self, row: int, force: float) -> list[tuple[Any, float]]:
+    def _curved(self, row: int, force: float, point: Any, normal: Any) -> list[tuple[Any, float]]:
         r"""What the derivative of a normal force [N] of an obstacle has beside that of a dead one.
 
         Returns:
@@ -187,7 +184,7 @@ class Gaps:
             field, which = next(parts)
         if isinstance(field, HalfSpaces):
             return []
-        point, bends = self.core_points[row].tolist(), self.bends(field, int(which[place]), row)
+        bends = field.bends(int(which[place]), point, float(self.distances[row]), normal)
         found: list[tuple[Any, float]] = [((*way, *times(point, way)), force * weight) for way, weight in bends]
         if bends and self.features[row] == INSIDE:
             span: Any = self.places.spans[self.capsules[row]].tolist()
@@ -195,15 +192,9 @@ class Gaps:
             x, y, z = (sum(share * way[k] for share, (way, _) in zip(shares, bends, strict=True)) for k in range(3))  # H t
             bend = inner((x, y, z), span)
             if bend > 0.0:
-                (a, b, c), (d, e, f) = times(point, (x, y, z)), times(span, self.normals[row].tolist())
+                (a, b, c), (d, e, f) = times(point, (x, y, z)), times(span, normal)
                 found.append(((x, y, z, a + d, b + e, c + f), -force / bend))
         return found
-
-    def bends(self, field: Field, number: int, row: int) -> Bends:
-        """Second derivative of the distance of a candidate from a body of a field."""
-        point: Any = self.core_points[row].tolist()
-        normal: Any = self.normals[row].tolist()
-        return field.bends(number, point, float(self.distances[row]), normal)
 
     def _curved_by_itself(self, rows: Any, forces: FloatArray) -> FloatArray:
         """The same of candidates of the robot with itself, as factors of a derivative, shape (2, k, nv)."""

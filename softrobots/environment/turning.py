@@ -31,7 +31,8 @@ def turning(gaps: Gaps) -> tuple[FloatArray, FloatArray]:
         first += len(which)
         if isinstance(field, HalfSpaces) or not len(rows):
             continue
-        bends = [gaps.bends(field, *pair) for pair in zip(which.tolist(), rows.tolist(), strict=True)]
+        places = (gaps.core_points[rows], gaps.distances[rows], gaps.normals[rows])
+        bends = [field.bends(*one) for one in zip(which.tolist(), *(part.tolist() for part in places), strict=True)]
         hessian = np.array([sum((weight * np.outer(a, a) for a, weight in one), np.zeros((3, 3))) for one in bends])
         spans = gaps.places.spans[gaps.capsules[rows]]
         pulls = (hessian @ spans[:, :, None])[:, :, 0]
