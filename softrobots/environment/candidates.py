@@ -116,10 +116,12 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
 
 def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, merged: float) -> list[Candidates]:
     """The same for few ends, a list of points, and the bodies of a field, with their numbers, in plain numbers; or nothing."""
-    keys, rows = list[tuple[int, int, int]](), list[tuple[float, ...]]()
+    keys: list[tuple[int, int, int]] = []
+    rows: list[tuple[float, ...]] = []
     for which in range(len(numbers)):
         body: Any = field.single(which)
-        bounds, seen = [math.dist(end, body.centre) - body.around for end in ends], dict[int, Seen]()
+        bounds = [math.dist(end, body.centre) - body.around for end in ends]
+        seen: dict[int, Seen] = {}
         for capsule, (both, counted, radius, length) in enumerate(cores.plain):
             limit, (first, last) = margin + radius, both
             if bounds[first] + bounds[last] > 2.0 * limit + length:

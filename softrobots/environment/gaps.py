@@ -124,10 +124,13 @@ class Gaps:
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
             return self._cores.no_load
-        count, loads, (points, normals) = len(self._transforms), list[Any](), self._plain
+        count, values, (points, normals) = len(self._transforms), forces.tolist(), self._plain
         points = points if normal else self.points.tolist()
-        angular, by_force, owners, own = list[float](), list[float](), list[int](), list[int]()  # rows of six, joined
-        values = forces.tolist()
+        loads: list[Any] = []
+        angular: list[float] = []  # rows of six, joined
+        by_force: list[float] = []
+        owners: list[int] = []
+        own: list[int] = []
         for row in rows.tolist():
             capsule, other, _ = self.keys[row]
             force = [values[row] * one for one in normals[row]] if normal else values[row]
@@ -198,7 +201,8 @@ class Gaps:
 
     def _curved_by_itself(self, rows: Any, forces: FloatArray) -> FloatArray:
         """The same of candidates of the robot with itself, as factors of a derivative, shape (2, k, nv)."""
-        found, weights = list[FloatArray](), list[float]()
+        found: list[FloatArray] = []
+        weights: list[float] = []
         for row in rows:
             pair = int(self.capsules[row]), int(self.obstacles[row]) - len(self._transforms)
             distance = float(self.distances[row] + self._cores.radii[pair[1]])
