@@ -23,11 +23,10 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import skew
 from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
 from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores, cores_of
-from softrobots.environment.distance_fields import HalfSpaces
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
 from softrobots.environment.self_contact import relative_curvature, self_contact_pairs
-from softrobots.environment.single_bodies import inner, times
+from softrobots.environment.single_bodies import Bends, inner, times
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
 
@@ -141,7 +140,7 @@ class Gaps:
                 loads.append((other - count, [-one for one in force], point.tolist()))
                 own.append(row)
             elif normal:
-                for wrench, weight in self._curved(row, values[row], points[row], normals[row]):
+                for wrench, weight in self._curved(row, values[row]):
                     by_force += wrench
                     angular += [weight * one for one in wrench]
                     owners.append(capsule)
@@ -174,20 +173,23 @@ class Gaps:
             scale=self.reach * size,
         )
 
-    def _curved(self, row: int, force: float, point: Any, normal: Any) -> list[tuple[Any, float]]:
-        r"""What the derivative of a normal force [N] of an obstacle has beside that of a dead one.
-
-        Returns:
-            Wrenches, force first, and weights `w` [N/m]: it is :math:`\sum w\,a^T a` with the torques `a` of the wrenches.
-        """
+    def bends(self, row: int) -> Bends:
+        """Second derivative of the distance of a candidate from its obstacle."""
         place, parts = row, iter(self.parts)
         field, which = next(parts)
         while place >= len(which):
             place -= len(which)
             field, which = next(parts)
-        if isinstance(field, HalfSpaces):
-            return []
-        bends = field.bends(int(which[place]), point, float(self.distances[row]), normal)
+        points, normals = self._plain
+        return field.bends(int(which[place]), points[row], float(self.distances[row]), normals[row])
+
+    def _curved(self, row: int, force: float) -> list[tuple[Any, float]]:
+        r"""What the derivative of a normal force [N] of an obstacle has beside that of a dead one.
+
+        Returns:
+            Wrenches, force first, and weights `w` [N/m]: it is :math:`\sum w\,a^T a` with the torques `a` of the wrenches.
+        """
+        point, normal, bends = self._plain[0][row], self._plain[1][row], self.bends(row)
         found: list[tuple[Any, float]] = [((*way, *times(point, way)), force * weight) for way, weight in bends]
         if bends and self.features[row] == INSIDE:
             span: Any = self.places.spans[self.capsules[row]].tolist()
