@@ -12,6 +12,7 @@ from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
+from softrobots.environment.single_bodies import Seen
 from softrobots.environment.single_pairs import single_pair
 
 _NOBODY = np.zeros(0, dtype=np.intp)
@@ -60,15 +61,12 @@ def find_candidates(
         The candidates.
     """
     ends = places.ends.reshape(-1, 3).take(cores.single_ends, 0)
-    limits, ways = margin + cores.radii, 2.0 * margin + cores.ways
     found: list[Candidates] = []
     for field, numbers in fields:
         if len(ends) * len(numbers) <= _FEW and field.single(0) is not None:
-            new = _few(field, cores, ends.tolist(), len(numbers), margin, merged)
-            if len(new.capsules):
-                found.append(new._replace(obstacles=numbers.take(new.obstacles)))
+            found += _few(field, numbers, cores, ends.tolist(), margin, merged)
             continue
-        distances = field.at_least(ends)
+        distances, limits = field.at_least(ends), margin + cores.radii
         standing = _standing(field, cores, ends, distances) if len(cores.at_base) else None
         if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
             touching = distances <= limits.take(cores.end_capsules)[:, None]
@@ -81,7 +79,9 @@ def find_candidates(
             new = Candidates([(field, which)], capsules, which, features, ends.take(near, 0), values, normals)
         else:
             # the distance changes by at most the length of the way: what is far at both ends is far between them
-            near, which = (np.add.reduce(distances.take(cores.end_numbers, 0), 1) <= ways[:, None]).nonzero()
+            near, which = (
+                np.add.reduce(distances.take(cores.end_numbers, 0), 1) <= (2.0 * margin + cores.ways)[:, None]
+            ).nonzero()
             if not len(near):
                 continue
             counted = cores.counted.take(near, 0)
@@ -91,7 +91,7 @@ def find_candidates(
         if len(new.capsules):
             found.append(Candidates(new.parts, new.capsules, numbers.take(new.obstacles), *new[3:]))
     if pairs is not None:
-        found.append(_own(cores, places, pairs, limits, margin, merged, sum(len(numbers) for _, numbers in fields)))
+        found.append(_own(cores, places, pairs, margin, merged, sum(len(numbers) for _, numbers in fields)))
     if len(found) == 1:
         return found[0]
     if not found:
@@ -114,33 +114,42 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
     return standing
 
 
-def _few(field: Field, cores: Cores, ends: Any, count: int, margin: float, merged: float) -> Candidates:
-    """The same for few ends, a list of points, and the `count` bodies of a field, in plain numbers."""
-    bodies: list[Any] = [field.single(number) for number in range(count)]
-    table = [[body.seen(end) for body in bodies] for end in ends]
-    keys, rows = list[tuple[int, int, int]](), list[tuple[float, ...]]()
-    for capsule, (numbers, counted, radius, length) in enumerate(cores.plain):
-        (x, y, z), (u, v, w) = start, end = ends[numbers[0]], ends[numbers[1]]
-        limit = margin + radius
-        for which, (body, first, last) in enumerate(zip(bodies, table[numbers[0]], table[numbers[1]], strict=True)):
-            if first.distance + last.distance > 2.0 * limit + length:
+def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, merged: float) -> list[Candidates]:
+    """The same for few ends, a list of points, and the bodies of a field, with their numbers, in plain numbers; or nothing."""
+    keys: list[tuple[int, int, int]] = []
+    rows: list[tuple[float, ...]] = []
+    for which in range(len(numbers)):
+        body: Any = field.single(which)
+        bounds = [math.dist(end, body.centre) - body.around for end in ends]
+        seen: dict[int, Seen] = {}
+        for capsule, (both, counted, radius, length) in enumerate(cores.plain):
+            limit, (first, last) = margin + radius, both
+            if bounds[first] + bounds[last] > 2.0 * limit + length:
                 continue
-            for feature, share, distance, normal in single_pair(body, first, last, length, limit, merged):
+            for number in both:
+                if number not in seen:
+                    seen[number] = body.seen(ends[number])
+            start, end = seen[first], seen[last]
+            if start.distance + end.distance > 2.0 * limit + length:
+                continue
+            for feature, share, distance, normal in single_pair(body, start, end, length, limit, merged):
                 if feature >= INSIDE:
+                    (x, y, z), (u, v, w) = ends[first], ends[last]
                     point = x + share * (u - x), y + share * (v - y), z + share * (w - z)
                 elif distance <= limit and counted[feature]:
-                    point = end if feature else start
-                    base, near = cores.base_of.get(numbers[feature], (0, -math.inf))
-                    if table[base][which].distance < near:  # it stands there
+                    point = ends[both[feature]]
+                    base = cores.base_of.get(both[feature])
+                    if base is not None and body.seen(ends[base[0]]).distance < base[1]:  # it stands there
                         continue
                 else:
                     continue
                 keys.append((capsule, which, feature))
                 rows.append((*point, distance, *body.out(normal)))
     if not rows:
-        return NOTHING
+        return []
     (capsules, others, features), found = np.array(keys).T, np.array(rows)
-    return Candidates([(field, others)], capsules, others, features, found[:, :3], found[:, 3], found[:, 4:])
+    columns = numbers.take(others), features, found[:, :3], found[:, 3], found[:, 4:]
+    return [Candidates([(field, others)], capsules, *columns)]
 
 
 def _near(
@@ -163,13 +172,11 @@ def _near(
     return Candidates([(field, columns[1])], *columns)
 
 
-def _own(
-    cores: Cores, places: CorePlaces, pairs: Any, limits: FloatArray, margin: float, merged: float, count: int
-) -> Candidates:
+def _own(cores: Cores, places: CorePlaces, pairs: Any, margin: float, merged: float, count: int) -> Candidates:
     """Candidates between the robot's own capsules, which are obstacles after the `count` of the environment."""
     field = own_capsules(cores, places)
     near = near_pairs(cores, places, pairs, margin)
-    found = _near(field, places, near[:, 0], near[:, 1], np.True_, limits, merged)
+    found = _near(field, places, near[:, 0], near[:, 1], np.True_, margin + cores.radii, merged)
     ends = (found.features < INSIDE).nonzero()[0]
     numbers = cores.end_numbers[found.capsules[ends], found.features[ends]]
     found.capsules[ends], found.features[ends] = cores.end_capsules[numbers], cores.end_features[numbers]

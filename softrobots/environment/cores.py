@@ -24,12 +24,15 @@ class CorePlaces(NamedTuple):
 
     ends: FloatArray
     """Start and end of each core, shape (n, 2, 3) [m]."""
-    spans: FloatArray
-    """From start to end, shape (n, 3) [m]."""
     jacobian: FloatArray
     """Velocity of the point of a body at the world's origin, then angular, per joint rate, shape (6, nv)."""
     placements: FloatArray
     """Transforms of the joints that carry capsules to the world, shape (k, 4, 4)."""
+
+    @property
+    def spans(self) -> FloatArray:
+        """From start to end of each core, shape (n, 3) [m]."""
+        return np.asarray(self.ends[:, 1] - self.ends[:, 0])
 
 
 class Cores:
@@ -50,8 +53,6 @@ class Cores:
         ends = np.array([[one.start, one.end] for one in self.capsules]).reshape(-1, 2, 3)
         self._local = np.concatenate([ends, np.ones((self.count, 2, 1))], axis=2)
         nothing = read_only(np.zeros((0, self._model.nv)))
-        self.no_rows = nothing, read_only(np.zeros(0))
-        """No row over the joints, shape (0, nv), and its weights."""
         self.no_load = JointLoad(read_only(np.zeros(self._model.nv)), nothing, nothing, None, None, 0.0, 0.0)
         """No load on the joints."""
         self.moves = self._motion()
@@ -85,7 +86,7 @@ class Cores:
         placements = self._data.oMi
         transforms = np.array([placements[number].homogeneous for number in self._numbers])
         ends = (self._local @ transforms.take(self.carrier, 0).swapaxes(1, 2))[:, :, :3]
-        return CorePlaces(ends, ends[:, 1] - ends[:, 0], jacobian, transforms)
+        return CorePlaces(ends, jacobian, transforms)
 
     def _motion(self) -> FloatArray:
         joints = self._model.joints

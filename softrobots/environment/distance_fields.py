@@ -9,6 +9,7 @@ distance from a curved feature: 0 at a plane, :math:`(I - n n^T) / d` at a point
 
 from __future__ import annotations
 
+import math
 from typing import Any, NamedTuple, Protocol
 
 import numpy as np
@@ -103,10 +104,10 @@ def _turned_out(rotations: FloatArray, which: Any, vectors: FloatArray) -> Float
     return np.asarray(np.matvec(rotations.take(which, 0), vectors))
 
 
-def _single(rotations: FloatArray, centres: FloatArray, number: int, *sizes: Any) -> Body:
+def _single(rotations: FloatArray, centres: FloatArray, number: int, halves: Triple, radius: float, is_round: bool) -> Body:
     """A body in plain numbers."""
     rows: Any = rotations[number].tolist()
-    return Body(rows, centres[number].tolist(), *sizes)
+    return Body(rows, centres[number].tolist(), halves, radius, is_round, math.hypot(*halves) + radius)
 
 
 class _Around(NamedTuple):

@@ -23,13 +23,14 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import skew
 from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
 from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores, cores_of
-from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
 from softrobots.environment.self_contact import relative_curvature, self_contact_pairs
 from softrobots.environment.single_bodies import Bends, inner, times
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
+
+_TURNS = tuple(np.eye(3, 6, 3).ravel().tolist())  # rows of the angular velocity
 
 
 class MaterialPoints(NamedTuple):
@@ -75,8 +76,8 @@ class Gaps:
         if own:
             rows = (found.obstacles >= len(transforms)).nonzero()[0]
             self.moves[rows] -= cores.moves[found.obstacles[rows] - len(transforms)]
-        normals = zip(found.normals.tolist(), found.points.tolist(), strict=True)
-        wrenches = np.array([(*normal, *times(point, normal)) for normal, point in normals]).reshape(-1, 6)
+        self._plain = found.points.tolist(), found.normals.tolist()
+        wrenches = np.array([(*n, *times(point, n)) for point, n in zip(*self._plain, strict=True)]).reshape(-1, 6)
         self.jacobian: FloatArray = wrenches.dot(places.jacobian) * self.moves
         """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
 
@@ -122,104 +123,97 @@ class Gaps:
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
             return self._cores.no_load
-        count, loads, capsules = len(self._transforms), list[tuple[Any, Any]](), list[int]()
-        points = (self.core_points if normal else self.points).tolist()
+        count, values, (points, normals) = len(self._transforms), forces.tolist(), self._plain
+        points = points if normal else self.points.tolist()
+        loads: list[Any] = []
+        angular: list[float] = []  # rows of six, joined
+        by_force: list[float] = []
+        owners: list[int] = []
+        own: list[int] = []
         for row in rows.tolist():
             capsule, other, _ = self.keys[row]
-            force = (forces[row] * self.normals[row] if normal else forces[row]).tolist()
-            loads.append((force, points[row]))
-            capsules.append(capsule)
+            force = [values[row] * one for one in normals[row]] if normal else values[row]
+            loads.append((capsule, force, points[row]))
             if other >= count:  # the other capsule takes the opposite force
                 depth = float(self._cores.radii[other - count]) if normal else 0.0
                 point = self.core_points[row] - (self.distances[row] + depth) * self.normals[row]
-                loads.append(([-one for one in force], point.tolist()))
-                capsules.append(other - count)
-        table, potential, size = list[Any](), 0.0, 0.0
-        for v, p in loads:
+                loads.append((other - count, [-one for one in force], point.tolist()))
+                own.append(row)
+            elif normal:
+                for wrench, weight in self._curved(row, values[row]):
+                    by_force += wrench
+                    angular += [weight * one for one in wrench]
+                    owners.append(capsule)
+        potential, size = 0.0, 0.0
+        for capsule, v, p in loads:
             (x, y, z), (a, b, c), work = v, p, inner(v, p)
-            table.append((0.0, z, -y, a * x - work, a * y, a * z))  # three rows of the derivative by turns, -v x (u - p x w)
-            table.append((-z, 0.0, x, b * x, b * y - work, b * z))
-            table.append((y, -x, 0.0, c * x, c * y, c * z - work))
-            table.append((*v, *times(p, v)))
+            by_force += (0.0, z, -y, a * x - work, a * y, a * z)  # three rows of -v x (u - p x w)
+            by_force += (-z, 0.0, x, b * x, b * y - work, b * z)
+            by_force += (y, -x, 0.0, c * x, c * y, c * z - work)
+            angular += _TURNS
+            owners += (capsule, capsule, capsule)
             potential, size = potential - work, size + math.hypot(x, y, z)
-        jacobian, moves = self.places.jacobian, self._cores.moves.take(capsules, 0)[:, None, :]
-        nv = jacobian.shape[1]
-        products = np.array(table).dot(jacobian).reshape(-1, 4, nv) * moves
-        angular, by_force = (jacobian[3:] * moves).reshape(-1, nv), products[:, :3].reshape(-1, nv)
+        jacobian, moves = self.places.jacobian, self._cores.moves
+        products = np.array(angular + by_force).reshape(-1, 6).dot(jacobian)
+        factors = products.reshape(2, len(owners), -1) * moves.take(owners, 0)
         if normal:
-            curved, weights = self._curvature(forces)
-            if len(weights):
-                angular, by_force = np.concatenate([angular, (curved.T * weights).T]), np.concatenate([by_force, curved])
+            torque = forces.dot(self.jacobian)
+        else:
+            wrenches = np.array([(*v, *times(p, v)) for _, v, p in loads]).dot(jacobian)
+            torque = np.add.reduce(wrenches * moves.take([capsule for capsule, _, _ in loads], 0))
+        if normal and own:
+            factors = np.concatenate([factors, self._curved_by_itself(own, forces)], axis=1)
         return JointLoad(
-            torque=np.add.reduce(products[:, 3]),
-            angular=angular,
-            by_force=by_force,
+            torque=torque,
+            angular=factors[0],
+            by_force=factors[1],
             by_moment=None,
             gravity_derivative=None,
             potential=potential,
             scale=self.reach * size,
         )
 
-    def _curvature(self, forces: FloatArray) -> tuple[FloatArray, FloatArray]:
-        r"""What the second derivatives of the gaps have beside those of dead forces.
+    def bends(self, row: int) -> Bends:
+        """Second derivative of the distance of a candidate from its obstacle."""
+        place, parts = row, iter(self.parts)
+        field, which = next(parts)
+        while place >= len(which):
+            place -= len(which)
+            field, which = next(parts)
+        points, normals = self._plain
+        return field.bends(int(which[place]), points[row], float(self.distances[row]), normals[row])
 
-        Args:
-            forces: Normal forces, shape (m,) [N].
+    def _curved(self, row: int, force: float) -> list[tuple[Any, float]]:
+        r"""What the derivative of a normal force [N] of an obstacle has beside that of a dead one.
 
         Returns:
-            Rows, shape (k, nv), and weights, shape (k,) [N/m], of `rows.T @ diag(weights) @ rows`.
+            Wrenches, force first, and weights `w` [N/m]: it is :math:`\sum w\,a^T a` with the torques `a` of the wrenches.
         """
-        first, found, weights = 0, list[FloatArray](), list[Any]()
-        for field, which in self.parts:
-            if not isinstance(field, HalfSpaces):
-                rows = first + forces[first : first + len(which)].nonzero()[0]
-                if len(rows) and self.obstacles[first] >= len(self._transforms):
-                    self._curved_by_itself(rows, forces, found, weights)
-                else:
-                    self._curved(field, which.take(rows - first).tolist(), rows.tolist(), forces, found, weights)
-            first += len(which)
-        if not found:
-            return self._cores.no_rows
-        return np.concatenate(found), np.concatenate(weights)
+        point, normal, bends = self._plain[0][row], self._plain[1][row], self.bends(row)
+        found: list[tuple[Any, float]] = [((*way, *times(point, way)), force * weight) for way, weight in bends]
+        if bends and self.features[row] == INSIDE:
+            span: Any = self.places.spans[self.capsules[row]].tolist()
+            shares = [weight * inner(way, span) for way, weight in bends]
+            x, y, z = (sum(share * way[k] for share, (way, _) in zip(shares, bends, strict=True)) for k in range(3))  # H t
+            bend = inner((x, y, z), span)
+            if bend > 0.0:
+                (a, b, c), (d, e, f) = times(point, (x, y, z)), times(span, normal)
+                found.append(((x, y, z, a + d, b + e, c + f), -force / bend))
+        return found
 
-    def _curved(self, field: Field, which: Any, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
-        """Append the terms of the candidates of one field."""
-        wrenches, owners, each = list[Any](), list[int](), list[float]()
-        for row, number in zip(rows, which, strict=True):
-            point, bends = self.core_points[row].tolist(), self.bends(field, number, row)
-            for direction, weight in bends:
-                wrenches.append((*direction, *times(point, direction)))
-                each.append(float(forces[row]) * weight)
-            if bends and self.features[row] == INSIDE:
-                span: Any = self.places.spans[self.capsules[row]].tolist()
-                shares = [weight * inner(direction, span) for direction, weight in bends]
-                x, y, z = (sum(share * a[k] for share, (a, _) in zip(shares, bends, strict=True)) for k in range(3))  # H t
-                bend = inner((x, y, z), span)
-                if bend > 0.0:
-                    (a, b, c), (d, e, f) = times(point, (x, y, z)), times(span, self.normals[row].tolist())
-                    wrenches.append((x, y, z, a + d, b + e, c + f))
-                    each.append(-float(forces[row]) / bend)
-            owners += [row] * (len(wrenches) - len(owners))
-        if wrenches:
-            found.append(np.array(wrenches).dot(self.places.jacobian) * self.moves.take(owners, 0))
-            weights.append(each)
-
-    def bends(self, field: Field, number: int, row: int) -> Bends:
-        """Second derivative of the distance of a candidate from a body of a field."""
-        point: Any = self.core_points[row].tolist()
-        normal: Any = self.normals[row].tolist()
-        return field.bends(number, point, float(self.distances[row]), normal)
-
-    def _curved_by_itself(self, rows: Any, forces: FloatArray, found: Any, weights: Any) -> None:
-        """Append the terms of candidates of the robot with itself."""
-        for row in rows.tolist():
+    def _curved_by_itself(self, rows: Any, forces: FloatArray) -> FloatArray:
+        """The same of candidates of the robot with itself, as factors of a derivative, shape (2, k, nv)."""
+        found: list[FloatArray] = []
+        weights: list[float] = []
+        for row in rows:
             pair = int(self.capsules[row]), int(self.obstacles[row]) - len(self._transforms)
             distance = float(self.distances[row] + self._cores.radii[pair[1]])
             slides = bool(self.features[row] == INSIDE)
             point, normal = self.core_points[row], self.normals[row]
             new, each = relative_curvature(self._cores, self.places, pair, point, normal, distance, slides)
-            found.append(np.array(new))
-            weights.append(float(forces[row]) * np.array(each))
+            found += new
+            weights += [float(forces[row]) * weight for weight in each]
+        return np.array([(np.array(found).T * weights).T, found])
 
     def material(self, rows: Any) -> MaterialPoints:
         """Return the nearest points of the two surfaces at some candidates as points of their materials.

@@ -14,7 +14,8 @@ _TINY = 1e-300
 Triple = tuple[float, float, float]
 """A point or a vector."""
 Bends = list[tuple[Triple, float]]
-r"""Directions `a`, world axes, and weights `c` [1/m]: the second derivative of a distance is :math:`\sum c\,a a^T`."""
+r"""Principal directions `a`, world axes, and curvatures `c` [1/m]: the second derivative of a distance is
+:math:`\sum c\,a a^T`."""
 
 
 def times(a: Triple, b: Triple) -> Triple:
@@ -52,6 +53,8 @@ class Body(NamedTuple):
     """Distance of the surface from the box, or zero [m]."""
     round: bool
     """Whether it is a cylinder."""
+    around: float
+    """Radius of a ball around it [m]."""
 
     @property
     def rounded(self) -> float:
@@ -102,29 +105,34 @@ class Body(NamedTuple):
         return distance - self.radius, (copysign(u / distance, x), copysign(v / distance, y), copysign(w / distance, z))
 
     def bends(self, distance: float, normal: Triple) -> Bends:
-        """Second derivative of the distance at a point with that distance and normal, world axes.
+        """Principal curvatures of the distance at a point with that distance and normal, world axes.
 
-        Of a box one over the distance from it, in the coordinates that are beyond faces and across the normal; of a cylinder
-        the curvature around the axis at side and rim, and one over the distance across the rim; nothing at faces.
+        Of a box one over the distance from it, in the two directions across the normal beyond a corner, across the edge beyond
+        an edge; of a cylinder the curvature around the axis at side and rim, and one over the distance across the rim; nothing
+        at faces.
         """
-        (x, y, z), distance, (first, second, third) = self.into(normal), distance + self.radius, self.rotation
+        (x, y, z), distance = self.into(normal), distance + self.radius
         if distance <= _TINY:
             return []
-        size = 1.0 / distance
         if self.round:
             radial = hypot(x, y)
             if radial < _TINY:
                 return []
-            outward = x / radial, y / radial, 0.0
-            around = [(self.out((-outward[1], outward[0], 0.0)), radial / (self.halves[0] + distance * radial))]
-            if radial <= ON_BORDER or abs(z) <= ON_BORDER:
-                return around
-            return [*around, (self.out(outward), size), ((first[2], second[2], third[2]), size), (normal, -size)]
-        curved = [half == 0.0 or abs(n) > ON_BORDER for half, n in zip(self.halves, (x, y, z), strict=True)]
-        if sum(curved) < 2:
+            around = self.out((-y / radial, x / radial, 0.0))
+            bends = [(around, radial / (self.halves[0] + distance * radial))]
+            if radial > ON_BORDER and abs(z) > ON_BORDER:
+                bends.append((times(normal, around), 1.0 / distance))
+            return bends
+        flat = [row for row, (half, n) in enumerate(zip(self.halves, (x, y, z), strict=True)) if half and abs(n) <= ON_BORDER]
+        if len(flat) > 1:
             return []
-        axes = zip(curved, zip(first, second, third, strict=True), strict=True)
-        return [(axis, size) for beyond, axis in axes if beyond] + [(normal, -size)]
+        if flat:
+            edge = self.out((float(flat[0] == 0), float(flat[0] == 1), float(flat[0] == 2)))
+            return [(times(normal, edge), 1.0 / distance)]
+        x, y, z = normal
+        size = hypot(x, y)
+        across = (-y / size, x / size, 0.0) if size > 0.5 else (0.0, -z / hypot(y, z), y / hypot(y, z))
+        return [(across, 1.0 / distance), (times(normal, across), 1.0 / distance)]
 
     def bend(self, distance: float, normal: Triple, way: Triple) -> float:
         """Second derivative of the distance along a direction, in its own axes; `RoundedBoxes.along`, `Cylinders.along`."""

@@ -77,10 +77,10 @@ def softest_motion(
     """
     if not math.isfinite(float(tangent.sum())):
         return -np.inf, np.zeros(len(stiffness))
+    if len(stiffness) and positive(LDLT(len(stiffness)), tangent - np.diag(2.0 * POSITIVE * stiffness)):  # on all motions
+        return np.inf, np.zeros(len(stiffness))
     soft = 1.0 / np.sqrt(stiffness)
     relative = soft[:, None] * tangent * soft
-    if len(soft) and positive(LDLT(len(soft)), relative - 2.0 * POSITIVE * np.eye(len(soft))):  # on all motions
-        return np.inf, np.zeros(len(soft))
     active = active_contacts(touch, reach, rounding)
     pressed, weak = touch.rows[active.pressed], touch.rows[active.weak]
     beside = null_space(pressed * soft) if len(pressed) else np.eye(len(soft))

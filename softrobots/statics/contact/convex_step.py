@@ -58,15 +58,15 @@ def contact_step(
     Returns:
         The step; None if the solver fails.
     """
-    gradients, (longest, damping) = rows * soft, limits
-    pull = soft * load
-    relative = soft[:, None] * hessian * soft
+    longest, damping = limits
     if damping:
-        relative = relative + damping * np.eye(len(soft))
-    convex, shift, exact = _convex(relative, gaps, gradients, held, factors)
-    found = solve_guessed(factors, pull, gradients, -gaps, held) if convex is relative else None
-    if found is None:
-        found = solve_programme(convex, pull if shift is None else pull + shift, gradients, -gaps)
+        hessian = hessian + np.diag(damping / (soft * soft))
+    guessed = solve_guessed(factors, load, rows, -gaps, held) if positive(factors, hessian) else None
+    if guessed is not None and norm(guessed[0]) <= longest:
+        return Step(*guessed, damping == 0.0)
+    gradients, pull = rows * soft, soft * load
+    convex, shift, exact = _convex(soft[:, None] * hessian * soft, gaps, gradients, held, factors)
+    found = solve_programme(convex, pull if shift is None else pull + shift, gradients, -gaps)
     if found is not None and shift is not None and shift.any():
         lost = 2.0 * float(found[1].sum()) * max(-float(gaps.min(initial=0.0)), 0.0)
         if not np.array_equal(found[1] > 0.0, held) or float(pull @ found[0]) > lost:  # other contacts are pressed, or uphill

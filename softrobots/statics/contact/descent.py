@@ -77,8 +77,8 @@ class ContactSearch:
         touch = state.touch
         if touch is None or not math.isfinite(state.energy):
             return None
-        pressed = touch.forces.nonzero()[0] if forces.entries else ()
-        gap = max(touch.penetration, *touch.gaps.values.take(pressed).tolist()) if len(pressed) else touch.penetration
+        pressed = touch.gaps.values.take(touch.forces.nonzero()[0])
+        gap = max(touch.penetration, *pressed.tolist()) if len(pressed) else touch.penetration
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
         error = max(state.error / allowed, gap / (_EXACT * self._reach))
         return Near(state, touch, error, seen, state.residual + touch.forces.dot(touch.rows))
@@ -105,23 +105,15 @@ class ContactSearch:
         return here, False
 
     def step(self, here: Near) -> Step | None:
-        """Step of the quadratic programme over the gaps that it can close."""
-        touch, values = here.touch, here.touch.gaps.values
-        sizes = np.sqrt(np.vecdot(touch.rows, touch.rows))
-        near = (values <= _LARGEST_STEP * sizes).nonzero()[0]
-        rows, held, tangent = touch.rows.take(near, 0), touch.forces.take(near) > 0.0, here.state.tangent
-        limits, gaps = (_LARGEST_STEP, self._damping), values.take(near)
-        found = contact_step(tangent, here.load, gaps, rows, held, self._soft, limits, self._factors)
-        forces = np.zeros(len(values))
-        if found is not None and found.forces.any() and not held.any():  # the first forces: how they soften counts, too
-            forces[near] = found.forces
-            tangent = tangent - contact_softening(here.state, forces)
-            first, held = found, found.forces > 0.0
-            found = contact_step(tangent, here.load, gaps, rows, held, self._soft, limits, self._factors) or first
-        if found is None:
-            return None
-        forces[near] = found.forces
-        return Step(found.step, forces, found.exact)
+        """Step of the quadratic programme over the gaps that are seen."""
+        touch, tangent, limits = here.touch, here.state.tangent, (_LARGEST_STEP, self._damping)
+        gaps, held = touch.gaps.values, touch.forces > 0.0
+        found = contact_step(tangent, here.load, gaps, touch.rows, held, self._soft, limits, self._factors)
+        if found is None or np.count_nonzero(held) or not np.count_nonzero(found.forces):
+            return found
+        tangent = tangent - contact_softening(here.state, found.forces)  # the first forces: how they soften counts, too
+        held = found.forces > 0.0
+        return contact_step(tangent, here.load, gaps, touch.rows, held, self._soft, limits, self._factors) or found
 
     def repaired(self, here: Near) -> Near:
         """Bring a robot that starts deep inside of obstacles towards their surface, bending it little."""
@@ -176,44 +168,50 @@ class ContactSearch:
         whole, change = step.step, step.forces - touch.forces
         if length > _LARGEST_STEP:
             whole, change = whole * (_LARGEST_STEP / length), change * (_LARGEST_STEP / length)
-        deep = touch.penetration
+        deep, first, share = touch.penetration, self.spent, 1.0
+        deepest = max(deep, _DEEP * self._reach)
+        seen = min(NEAR, max(_LEAST_SEEN, 2.0 * _moved(whole)))  # steps shrink: what the next one may touch
+        table = ForceTable.of(touch.gaps, touch.forces + change)
+        trial = self.near(state.q_springs + whole, table, seen)
+        self._price = max(2.0 * float(np.add.reduce(step.forces)), 0.5 * self._price)
+        exact = step.exact and length <= _LARGEST_STEP and trial is not None and trial.touch.penetration <= deepest
+        if trial is not None and exact and trial.error <= 0.5 * here.error:
+            self._damp(False)
+            return trial
         closes = deep - max(0.0, -float((touch.gaps.values + touch.rows @ whole).min())) if deep > 0.0 else 0.0
         downhill = float(here.load @ whole)
-        pressed, least = 2.0 * float(step.forces.sum()), 2.0 * downhill / closes if closes > 0.0 else 0.0
-        price = max(pressed, 0.5 * self._price, least)
-        predicted, self._price = downhill - price * closes, price
+        price = self._price = max(self._price, 2.0 * downhill / closes if closes > 0.0 else 0.0)
+        predicted = downhill - price * closes
         rounding = self.problem.rounding(state) + 1e-15 * price * self._reach
         if predicted > -rounding:
             predicted = min(0.0, 0.5 * float(whole @ state.tangent @ whole))
         below = predicted > -rounding  # rounding of the energy: it says nothing, the error must shrink
-        exact = step.exact and length <= _LARGEST_STEP
 
         def better(trial: Near | None, share: float) -> bool:
-            if trial is None or trial.touch.penetration > max(deep, _DEEP * self._reach):
+            if trial is None or trial.touch.penetration > deepest:
                 return False
-            if below or (exact and share == 1.0 and trial.error <= 0.5 * here.error):
+            if below:
                 return BALANCED < here.error > trial.error
             merit = trial.state.energy + price * trial.touch.penetration
             return merit <= state.energy + price * deep + _ARMIJO * share * predicted + rounding
 
-        share, first = 1.0, self.spent
-        seen = min(NEAR, max(_LEAST_SEEN, 2.0 * _moved(whole)))  # steps shrink: what the next one may touch
-        while self.spent < self.most and share > _SHORTEST:
+        if trial is not None and not better(trial, share):
+            back = _back_to_surface(trial.touch, self._soft)
+            if back is not None and norm(back) <= norm(whole):
+                trial = self.near(trial.state.q_springs + back, table, seen)
+        while not better(trial, share):
+            share *= 0.5
+            if below or self.spent >= self.most or share <= _SHORTEST:
+                return None
             table = ForceTable.of(touch.gaps, touch.forces + share * change)
             trial = self.near(state.q_springs + share * whole, table, seen)
-            if share == 1.0 and trial is not None and not better(trial, share):
-                back = _back_to_surface(trial.touch, self._soft)
-                if back is not None and norm(back) <= norm(whole):
-                    trial = self.near(trial.state.q_springs + back, table, seen)
-            if trial is not None and better(trial, share):
-                cut = self.spent > first + 2
-                self._damping = _LEAST_DAMPING + 4.0 * self._damping if cut else 0.25 * self._damping
-                self._damping *= self._damping >= _LEAST_DAMPING
-                return trial
-            if below:
-                break
-            share *= 0.5
-        return None
+        self._damp(self.spent > first + 2)
+        return trial
+
+    def _damp(self, cut: bool) -> None:
+        """Damp the next step more after one that was cut, else less."""
+        self._damping = _LEAST_DAMPING + 4.0 * self._damping if cut else 0.25 * self._damping
+        self._damping *= self._damping >= _LEAST_DAMPING
 
 
 def _moved(step: FloatArray) -> float:

@@ -56,20 +56,20 @@ def solve_guessed(
     free, chosen = -factors.solve(pull).ravel(), held.nonzero()[0]  # Eigen returns one row as a matrix
     lacking, multipliers = bounds - gradients.dot(free), np.zeros(len(bounds))
     if not len(chosen):
-        if not len(bounds) or lacking.max() <= 0.0:
+        chosen = lacking.argmax(keepdims=True) if len(bounds) else chosen
+        if not len(bounds) or lacking[chosen[0]] <= 0.0:
             return free, multipliers
-        chosen = lacking.argmax(keepdims=True)
     rows = gradients.take(chosen, 0)
     gives = factors.solve(rows.T).reshape(len(free), -1)
     forces = _independent(rows.dot(gives), lacking.take(chosen))
-    if forces is None or forces.min() < 0.0:
+    if forces is None or min(forces.tolist()) < 0.0:
         return None
     solution, multipliers[chosen] = free + gives.dot(forces), forces
-    if len(chosen) == len(bounds):
-        return solution, multipliers
-    broken = gradients.dot(solution) - bounds < -_BROKEN * np.sqrt(np.vecdot(gradients, gradients))
-    broken[chosen] = False
-    return None if broken.any() else (solution, multipliers)
+    lacking = bounds - gradients.dot(solution)
+    lacking[chosen] = 0.0
+    if max(lacking.tolist()) > 0.0 and (lacking > _BROKEN * np.sqrt(np.vecdot(gradients, gradients))).any():
+        return None
+    return solution, multipliers
 
 
 def _independent(matrix: FloatArray, right: FloatArray) -> FloatArray | None:

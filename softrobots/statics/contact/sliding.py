@@ -158,7 +158,7 @@ class SlidingRobot:
         What stands in the load is that of dead forces at material points.
         """
         rows = np.flatnonzero(forces.any(axis=1))
-        normals, points = (part[rows] for part in turning(gaps))
+        normals, points = turning(gaps, rows)
         moved = points - gaps.point_jacobian(rows, gaps.points[rows])
         angular = gaps.places.jacobian[3:] * gaps.moves[rows][:, None, :]
         couples = np.cross(moved, forces[rows, :, None], axis=1)

@@ -53,33 +53,38 @@ class Touch(NamedTuple):
 class ForceTable(NamedTuple):
     """Normal forces by candidate, to carry them from one evaluation to the next."""
 
-    entries: tuple[tuple[int, int, int, float], ...]
-    """Capsule, obstacle, feature, and force [N] where there is one."""
+    keys: tuple[tuple[int, int, int], ...]
+    """Capsule, obstacle and feature of each candidate."""
+    forces: FloatArray
+    """Their forces, shape (m,) [N]."""
 
     @classmethod
     def of(cls, gaps: Gaps, forces: FloatArray) -> ForceTable:
         """Take the forces on candidates, shape (m,) [N]."""
-        return cls(tuple((*key, force) for key, force in zip(gaps.keys, forces.tolist(), strict=True) if force != 0.0))
+        return cls(gaps.keys, forces)
 
     def at(self, gaps: Gaps) -> FloatArray:
         """Forces on other candidates, shape (m,) [N]; zero on new ones.
 
         The force on a candidate that is no longer there passes to the nearest other one of the same pair of bodies.
         """
-        forces = np.zeros(len(gaps.values))
-        places = dict(zip(gaps.keys, range(len(forces)), strict=True)) if self.entries else {}
-        for capsule, obstacle, feature, force in self.entries:
-            same = places.get((capsule, obstacle, feature))
+        if gaps.keys == self.keys:
+            return self.forces
+        forces, places = np.zeros(len(gaps)), dict(zip(gaps.keys, range(len(gaps)), strict=True))
+        for key, force in zip(self.keys, self.forces.tolist(), strict=True):
+            if force == 0.0:
+                continue
+            same = places.get(key)
             if same is not None:
                 forces[same] += force
                 continue
-            pair = ((gaps.capsules == capsule) & (gaps.obstacles == obstacle)).nonzero()[0]
+            pair = ((gaps.capsules == key[0]) & (gaps.obstacles == key[1])).nonzero()[0]
             if len(pair):
                 forces[pair[gaps.values[pair].argmin()]] += force
         return forces
 
 
-NO_FORCES = ForceTable(())
+NO_FORCES = ForceTable((), np.zeros(0))
 """No contact force yet."""
 
 
@@ -111,7 +116,7 @@ class NearSurfaces:
         gaps = self._surroundings.at(q, near * self._reach)
         on_motors, on_springs = point.columns(gaps.jacobian)
         each = forces.at(gaps)
-        deepest = max(0.0, -float(np.minimum.reduce(gaps.values))) if len(gaps.values) else 0.0
+        deepest = max(0.0, -min(gaps.values.tolist(), default=0.0))
         return Touch(gaps, on_springs, on_motors, each, gaps.load(each), self._surroundings, deepest)
 
 
