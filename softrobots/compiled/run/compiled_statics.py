@@ -15,12 +15,14 @@ from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
 from softrobots.compiled.run.certified import certified
 from softrobots.compiled.run.contact_batches import ContactSolver
+from softrobots.compiled.run.friction_states import StatesBefore, states_before
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.step_control import order_of_steps
 from softrobots.environment.environment import Environment
+from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 
 NO_FORCE = read_only(np.zeros(3))
@@ -51,7 +53,7 @@ class CompiledStatics:
         self._heavy: Any = None  # the same of the code with weight, once it is made
         self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
-        self._plain = not self._unknowns.n_constraints and backend == "numba"
+        self._plain = not self._unknowns.n_constraints and not self._layout.rubbing and backend == "numba"
         self._joints = self._chain.n_motors
 
     def __reduce__(self) -> tuple[Any, ...]:
@@ -148,10 +150,11 @@ class CompiledStatics:
             points: Number of placements along a section.
 
         Raises:
-            ParameterError: If `points` is not positive.
+            ParameterError: If `points` is not positive, or the robot has dry friction.
         """
         from softrobots.compiled.browser.script import script
 
+        check_frictionless(self._model, "solvers on pages")
         positive_integer("points", points, 1000)
         return script(self._model, self._unknowns, self._run(gravity).program, gravity=gravity, points=points)
 
@@ -162,6 +165,7 @@ class CompiledStatics:
         *,
         gravity: Any = None,
         q_springs0: Any = None,
+        previous: Any = None,
         environment: Environment | None = None,
     ) -> CompiledEquilibrium:
         """Find the equilibrium under a force on the tip.
@@ -170,7 +174,9 @@ class CompiledStatics:
             q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N]; fastest as an array of float64.
             force: Force on the tip, shape (3,) [N], world axes.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-            q_springs0: Start of the search, shape (n_springs,) [rad or m]; at rest by default.
+            q_springs0: Start of the search, shape (n_springs,) [rad or m]; by default `previous`, or at rest.
+            previous: Where a robot with dry friction comes from: an equilibrium of this or the general solver. None: nothing
+                has moved it yet.
             environment: Obstacles that the robot touches without friction, as in `equilibria`, from rest.
 
         Returns:
@@ -188,6 +194,7 @@ class CompiledStatics:
         if (
             self._plain
             and q_springs0 is None
+            and previous is None
             and type(q_motors) is np.ndarray
             and type(force) is np.ndarray
             and q_motors.dtype is DOUBLE
@@ -209,7 +216,7 @@ class CompiledStatics:
                     w[joints + 3 : joints + 6] = down
                 if settle(w) == 0:
                     return CompiledEquilibrium(w, layout, self._actuation)
-        return self._checked_equilibrium(q_motors, force, gravity, q_springs0)
+        return self._checked_equilibrium(q_motors, force, gravity, q_springs0, previous)
 
     def _plain_gravity(self, gravity: Any) -> FloatArray | None:
         """Return gravity that needs no check but that of the generated code: an array, or the tuple of the last call."""
@@ -227,33 +234,60 @@ class CompiledStatics:
             return vector
         return None
 
-    def _checked_equilibrium(self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any) -> CompiledEquilibrium:
+    def _checked_equilibrium(
+        self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any, previous: Any
+    ) -> CompiledEquilibrium:
         run = self._run(gravity is not None)
         motors = self._actuation.checked(q_motors)
         load = finite_array("force", force, (3,), "N")
         w = self._actuation.workspace(run, motors, force=load, gravity=gravity_vector(gravity))
-        if q_springs0 is None:
+        springs = None if q_springs0 is None else finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
+        before = self._before(previous, single=True)
+        if before is not None:
+            run.put(w, run.layout.sliders, before.sliders[0])
+            springs = before.springs[0] if springs is None else springs
+        if springs is None:
             status = Status(run.settle(w))
         else:
-            springs = finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
             run.put(w, run.layout.unknown, self._actuation.unknowns(motors, springs))
             status = Status(run.settle_from(w))
         return certified(CompiledEquilibrium(w, run.layout, self._actuation, motors, status))
 
+    def _before(self, previous: Any, *, single: bool = False) -> StatesBefore | None:
+        """Return the states before a step, see `states_before`; None for a robot without dry friction."""
+        if self._layout.rubbing:
+            before = states_before(self._actuation, previous)
+            if single and (len(before.springs) > 1 or before.lost[0]):
+                raise ParameterError("previous", previous, "one equilibrium")
+            return before
+        if previous is not None:
+            raise ParameterError("previous", previous, "None for a robot without dry friction, which remembers nothing")
+        return None
+
     def _solver_in_contact(self) -> ContactSolver:
+        check_frictionless(self._model, "compiled contact")
         self._touching = self._touching or ContactSolver(self._model, self._unknowns, self._backend)
         return self._touching
 
     def equilibria(
-        self, q_motors: Any, forces: Any, *, gravity: Any = None, threads: int = 1, environment: Any = None
+        self,
+        q_motors: Any,
+        forces: Any,
+        *,
+        gravity: Any = None,
+        threads: int = 1,
+        previous: Any = None,
+        environment: Any = None,
     ) -> EquilibriumBatch:
-        """Find the equilibria of many cases, each from rest.
+        """Find the equilibria of many cases, each from rest or, with dry friction, from the state before.
 
         Args:
             q_motors: Actuator coordinates, shape (n, n_motors), or (n_motors,) for all cases [rad, m or N].
             forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             threads: Number of threads; more than one speeds up numba only.
+            previous: Where robots with dry friction come from: the result of the last step of as many robots, a sequence of
+                equilibria, or one for all, see `equilibrium`. A row whose state before is no equilibrium keeps its status.
             environment: Obstacles that the robot touches without friction, or a sequence of environments, one a case, as
                 `[env.at(way) for way in ways]`. For robots of joints with linear springs, without meshes and self-contact.
 
@@ -268,7 +302,10 @@ class CompiledStatics:
         """
         run = self._run(gravity is not None)
         rows = self._model.actuators.in_order(q_motors, "q_motors")
-        motors, loads = batch_rows(q_motors=(rows, self._model.n_motors), forces=(forces, 3))
+        before, counted = self._before(previous), {}
+        if before is not None and len(before.springs) > 1:
+            counted = {"previous": (before.springs, self._model.n_springs)}
+        motors, loads, *_ = batch_rows(q_motors=(rows, self._model.n_motors), forces=(forces, 3), **counted)
         down = gravity_vector(gravity)
         bad = unusable(motors, loads) | self._actuation.unsuited(motors)
         motors, loads = without(motors, bad, self._model.relaxed_motors), without(loads, bad)
@@ -278,10 +315,18 @@ class CompiledStatics:
         layout = run.layout
         inputs = [(layout.force, loads), (layout.gravity, down[None]), *self._actuation.rows(motors, layout)]
         results = [(layout.unknown, layout.unknowns), (layout.tip, 3), (layout.single("error"), 1)]
-        (unknowns, tips, squares), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
+        if before is not None:
+            springs = np.broadcast_to(before.springs, (len(motors), self._model.n_springs))
+            inputs += [(layout.sliders, before.sliders), (layout.unknown, self._actuation.of_elastic(motors, springs))]
+            results.append((layout.slid, layout.unknowns))
+        (unknowns, tips, squares, *slid), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
         residuals = root(squares)
-        fail(statuses, bad, [residuals], [unknowns, tips])
-        return EquilibriumBatch(self._actuation.elastic(unknowns), statuses, residuals, tips)
+        fail(statuses, bad, [residuals], [unknowns, tips, *slid])
+        springs = self._actuation.elastic(unknowns)
+        if before is None:
+            return EquilibriumBatch(springs, statuses, residuals, tips)
+        statuses = np.where(before.lost, before.status, statuses).astype(np.uint8)
+        return EquilibriumBatch(springs, statuses, residuals, tips, friction_bending=self._actuation.bending(slid[0]))
 
     def _run(self, weight: bool, poses: bool = False) -> Any:
         """Return the code with or without gravity, for positions or poses as targets, generated on first use.

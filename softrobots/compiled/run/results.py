@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -17,6 +17,7 @@ from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.result_file import TABLES, vector_columns
 from softrobots.core.summary import Part, Summarised, Table, facts, field_facts
 from softrobots.dynamics.motion import Motion, MotionEnergy
+from softrobots.model.soft_model import SoftModel
 
 
 class CompiledEquilibrium(Summarised):
@@ -76,6 +77,18 @@ class CompiledEquilibrium(Summarised):
             return read_only(np.array(self._motors))
         layout = self._layout
         return read_only(np.concatenate([self._part(0, layout.motors), self._part(layout.actuators, layout.muscles)]))
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+        return self._actuation.model
+
+    @property
+    def friction_bending(self) -> FloatArray | None:
+        """Bending that dry friction remembers, of the sliders of its sections, shape (n_sections, 2) [rad]; None without it."""
+        if not self._layout.rubbing:
+            return None
+        return read_only(self._actuation.bending(self._part(self._layout.slid, self._layout.unknowns)[None])[0])
 
     @property
     def force(self) -> FloatArray:
@@ -162,7 +175,8 @@ class Batch(CaseResults):
     def summary_parts(self) -> list[Part]:
         """Return how many cases have which status, and the ranges of their numbers."""
         counts = [(f"cases {status.name.lower().replace('_', ' ')}", str(number)) for status, number in self.counts().items()]
-        return [facts([*counts, *field_facts(self, *(one.name for one in fields(self) if one.name != "status"))])]
+        shown = [one.name for one in fields(self) if one.name != "status" and getattr(self, one.name) is not None]
+        return [facts([*counts, *field_facts(self, *shown)])]
 
     def counts(self) -> dict[Status, int]:
         """Return the number of cases by status, without statuses that did not occur."""
@@ -176,6 +190,8 @@ class EquilibriumBatch(Batch):
 
     tip_positions: FloatArray
     """The loaded tip, shape (n, 3) [m], world axes."""
+    friction_bending: FloatArray | None = field(default=None, kw_only=True)
+    """Bending that dry friction remembers, of the sliders of its sections, shape (n, n_sections, 2) [rad]; None without it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
