@@ -32,6 +32,11 @@ def one_segment(**fields: Any) -> sr.TendonArm:
     )
 
 
+@pytest.fixture(scope="module")
+def fast() -> CompiledModel:
+    return compiled(one_segment())
+
+
 def compiled(robot: Any, backend: str = "python", **options: Any) -> CompiledModel:
     return sr.compile(sr.load_model(robot), backend=backend, **options)
 
@@ -54,7 +59,7 @@ def curvature(springs: np.ndarray) -> np.ndarray:
 PLAY = 2.02 * STICK / (LENGTH / 4)  # between whole friction one way and the other a section gives way by two sticks
 
 
-def test_loops_in_a_batch_play_between_two_lines() -> None:
+def test_loops_in_a_batch_play_between_two_lines(fast: CompiledModel) -> None:
     """Three robots side by side, each with its own loop; the last result is where all come from."""
     loops = np.array(
         [
@@ -63,8 +68,7 @@ def test_loops_in_a_batch_play_between_two_lines() -> None:
             [0.0, 0.3, 0.1, 0.2, 0.4, 0.3, 1.4, 1.3, 1.2, 0.9, 0.4],
         ]
     )
-    fast, last = compiled(one_segment()), None
-    found = []
+    last, found = None, []
     for tensions in loops.T:
         last = fast.equilibria(tensions[:, None], np.zeros(3), previous=last)
         assert last.certified.all()
@@ -135,9 +139,8 @@ def test_steps_are_those_of_the_general_solver(name: str) -> None:
     assert np.abs(fresh.tip_position - slow.tip_position).max() > 1e-5 * model.reach  # the way matters
 
 
-def test_every_kind_of_result_is_a_state_before() -> None:
+def test_every_kind_of_result_is_a_state_before(fast: CompiledModel) -> None:
     """Equilibria of both solvers, a sequence of them, and a batch: the same next step."""
-    fast = compiled(one_segment())
     slow = sr.solve_equilibrium(fast.model, [2.0])
     quick, batch = fast.equilibrium([2.0]), fast.equilibria([[2.0], [0.1]], np.zeros(3))
     expected = sr.solve_equilibrium(fast.model, [1.0], previous=slow).q_springs
@@ -154,9 +157,8 @@ def test_every_kind_of_result_is_a_state_before() -> None:
     assert quick.friction_bending == pytest.approx(batch.friction_bending[0], abs=1e-12)
 
 
-def test_the_slider_follows_at_a_stick() -> None:
+def test_the_slider_follows_at_a_stick(fast: CompiledModel) -> None:
     """Pulled on and on, the sliders stand one stick short of the bending of their sections."""
-    fast = compiled(one_segment())
     pulled = fast.equilibrium([3.0])
     assert pulled.friction_bending.shape == (4, 2)
     assert pulled.friction_bending[:, 1] == pytest.approx(curvature(pulled.q_springs) * LENGTH / 4 - STICK, abs=1e-12)
@@ -173,8 +175,7 @@ def test_locked_strains_do_not_rub() -> None:
         assert curvature(last.q_springs) == pytest.approx(np.full(4, expected), abs=PLAY)
 
 
-def test_a_row_without_a_state_before_keeps_its_status() -> None:
-    fast = compiled(one_segment())
+def test_a_row_without_a_state_before_keeps_its_status(fast: CompiledModel) -> None:
     last = fast.equilibria([[2.0], [np.nan], [1.0]], np.zeros(3))
     after = fast.equilibria([[1.0], [1.0], [0.5]], np.zeros(3), previous=last)
     assert after.status.tolist() == [Status.CERTIFIED, Status.NOT_A_NUMBER, Status.CERTIFIED]
@@ -184,7 +185,7 @@ def test_a_row_without_a_state_before_keeps_its_status() -> None:
 
 
 def test_a_force_comes_back_from_the_tensions_and_the_state_before() -> None:
-    fast = compiled(sr.TendonArm(segment_lengths=(0.06, 0.07), bending_friction=5e-4, elastic_sections=2))
+    fast = compiled(sr.TendonArm(segment_lengths=(0.06, 0.07), bending_friction=5e-4, elastic_sections=1))
     motors = fast.model.relaxed_motors - (1e-3, 0.0, 0.0, 0.0, 0.0, 0.0)
     before, force = fast.equilibrium(motors), np.array([0.05, 0.1, 0.0])
     slow = sr.solve_equilibrium(fast.model, motors)
@@ -214,15 +215,15 @@ def test_a_force_comes_back_from_the_tensions_and_the_state_before() -> None:
             "as many rows as the others have",
         ),
         (
-            lambda fast: fast.equilibrium([1.0], previous=compiled(ROBOTS["lengths"][0]).equilibrium([0.5] * 6)),
+            lambda fast: fast.equilibrium([1.0], previous=compiled(one_segment(rest_bend_x=1.0)).equilibrium([1.0])),
             "of the model given",
         ),
         (lambda _: compiled(one_segment(guide_friction=0.1)), "without friction in guides, to be compiled"),
     ],
 )
-def test_what_makes_no_sense_is_refused(call: Callable[[CompiledModel], Any], words: str) -> None:
+def test_what_makes_no_sense_is_refused(fast: CompiledModel, call: Callable[[CompiledModel], Any], words: str) -> None:
     with pytest.raises(sr.ParameterError, match=words):
-        call(compiled(one_segment()))
+        call(fast)
 
 
 def test_a_robot_without_friction_remembers_nothing() -> None:
@@ -232,7 +233,7 @@ def test_a_robot_without_friction_remembers_nothing() -> None:
     with pytest.raises(sr.ParameterError, match="None for a robot without dry friction"):
         fast.equilibrium(fast.model.relaxed_motors, previous=found)
     with pytest.raises(sr.ParameterError, match="without dry friction, for compiled batches of estimates"):
-        compiled(sr.TendonArm(segment_lengths=(LENGTH,), bending_friction=MOMENT)).estimate_loads(
+        compiled(sr.TendonArm(segment_lengths=(LENGTH,), elastic_sections=1, bending_friction=MOMENT)).estimate_loads(
             np.full(3, LENGTH), np.zeros(3)
         )
 
@@ -254,9 +255,9 @@ def test_numba_takes_the_same_steps(tool: Callable[[str], Any]) -> None:
 
 
 @pytest.mark.system
-def test_c_code_takes_the_same_steps(tmp_path: Path) -> None:
+def test_c_code_takes_the_same_steps(fast: CompiledModel, tmp_path: Path) -> None:
     """From the last unknowns and sliders, as a control loop does."""
-    fast, last, loop = compiled(one_segment()), None, [1.0, 3.0, 2.0, 0.2]
+    last, loop = None, [1.0, 3.0, 2.0, 0.2]
     in_c = Controller(fast, tmp_path, name="segment")
     in_c.clear()
     for tension in loop:

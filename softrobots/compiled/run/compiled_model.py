@@ -41,7 +41,8 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
         Its solvers. numba compiles each of them on its first call.
 
     Raises:
-        ParameterError: If the model is not a SoftModel, the back end is unknown, or strains cannot be locked.
+        ParameterError: If the model is not a SoftModel, actuators rub in their guides, the back end is unknown, or strains
+            cannot be locked.
         NameNotFound: If a strain to lock does not exist.
         DescriptionError: If the robot is not a serial chain with linear springs.
         MissingDependency: If `backend` is "numba" and numba is not installed.
@@ -61,8 +62,8 @@ class CompiledModel(CompiledDynamics):
     """Compiled solvers of a robot, for single cases and for batches; made by `softrobots.compile`.
 
     Loads are a dead force on the tip and gravity, in world axes. Angles, signs and tolerances are those of
-    `softrobots.solve_equilibrium`; of several equilibria the result is the one that descent from rest reaches. Safe to share
-    between threads.
+    `softrobots.solve_equilibrium`; of several equilibria the result is the one that descent from rest reaches, or with dry
+    friction from the state before. Safe to share between threads.
     """
 
     def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
@@ -142,8 +143,8 @@ class CompiledModel(CompiledDynamics):
             One row a case.
 
         Raises:
-            ParameterError: If a shape differs, gravity is not finite, or the robot has no actuators or muscles of given
-                tension.
+            ParameterError: If a shape differs, gravity is not finite, or the robot has no actuators, muscles of given
+                tension, or dry friction.
         """
         check_feels(check_frictionless(self._model, "compiled batches of estimates (estimate_load takes it)"))
         run = self._run(gravity is not None)
@@ -193,7 +194,7 @@ class CompiledModel(CompiledDynamics):
 
         Raises:
             ParameterError: If a shape differs, a pose has no rotation, gravity, tolerance or a count is out of range, or the
-                robot has no actuators; for poses also if it has less than six motors, sections, muscles or a long chain.
+                robot has no actuators or dry friction; for poses also if it has less than six motors, sections, muscles or a long chain.
         """
         relaxed = start_motors(check_frictionless(self._model, "compiled inverse kinematics"), None)
         goals, poses = flat_targets(targets)
@@ -250,8 +251,8 @@ class CompiledModel(CompiledDynamics):
             Motors, elastic coordinates and errors of the waypoints; see the status of each.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators, or cannot have poses; see
-                `inverse_kinematics`.
+            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators, dry friction, or cannot
+                have poses; see `inverse_kinematics`.
             TargetUnreachable: If the first waypoint cannot be reached; from `solve_ik` if no start is given.
         """
         start_motors(check_frictionless(self._model, "compiled paths"), None)
