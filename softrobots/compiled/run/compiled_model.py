@@ -194,7 +194,8 @@ class CompiledModel(CompiledDynamics):
 
         Raises:
             ParameterError: If a shape differs, a pose has no rotation, gravity, tolerance or a count is out of range, or the
-                robot has no actuators or dry friction; for poses also if it has less than six motors, sections, muscles or a long chain.
+                robot has no actuators, or dry friction; for poses also if it has less than six motors, sections, muscles or a
+                long chain.
         """
         relaxed = start_motors(check_frictionless(self._model, "compiled inverse kinematics"), None)
         goals, poses = flat_targets(targets)
