@@ -182,7 +182,9 @@ class Actuation:
             paths, slope = self._chain.muscle_paths, self._chain.constrained_slope
             straight = strains = strains + (motors[:, self._count :] - paths.rest) @ self._chain.spread.T
             for _ in range(_CLOSING_STEPS):
-                strains = straight - paths.at(strains).excess @ slope.T @ self._shares
+                last, strains = strains, straight - paths.at(strains).excess @ slope.T @ self._shares
+                if np.array_equal(last, strains):  # at once where nothing is twisted
+                    break
         return np.asarray(strains[:, self._strains])
 
     def elastic(self, unknowns: FloatArray) -> FloatArray:
