@@ -209,6 +209,10 @@ def test_a_force_comes_back_from_the_tensions_and_the_state_before() -> None:
         (lambda fast: fast.equilibrium([1.0], environment=sr.Environment([])), "without dry friction, for compiled contact"),
         (lambda fast: fast.equilibrium([1.0], previous=1), "an Equilibrium of the model"),
         (lambda fast: fast.equilibria([1.0], np.zeros(3), previous=[]), "at least one state"),
+        (
+            lambda fast: fast.equilibria(np.ones((3, 1)), np.zeros(3), previous=fast.equilibria(np.ones((0, 1)), np.zeros(3))),
+            "as many rows as the others have",
+        ),
         (lambda fast: fast.equilibrium([1.0], previous=fast.equilibria([[1.0], [2.0]], np.zeros(3))), "one equilibrium"),
         (
             lambda fast: fast.equilibria(np.ones((3, 1)), np.zeros(3), previous=[fast.equilibrium([1.0])] * 2),

@@ -147,7 +147,7 @@ class CompiledStatics(CompiledCode):
         """Return the states before a step, see `states_before`; None for a robot without dry friction."""
         if self._layout.rubbing:
             before = states_before(self._actuation, previous)
-            if single and (len(before.springs) > 1 or before.lost[0]):
+            if single and (len(before.springs) != 1 or before.lost[0]):
                 raise ParameterError("previous", previous, "one equilibrium")
             return before
         if previous is not None:
@@ -193,7 +193,7 @@ class CompiledStatics(CompiledCode):
         run = self._run(gravity is not None)
         rows = self._model.actuators.in_order(q_motors, "q_motors")
         before, counted = self._before(previous), {}
-        if before is not None and len(before.springs) > 1:
+        if before is not None and len(before.springs) != 1:
             counted = {"previous": (before.springs, self._model.n_springs)}
         motors, loads, *_ = batch_rows(q_motors=(rows, self._model.n_motors), forces=(forces, 3), **counted)
         down = gravity_vector(gravity)
