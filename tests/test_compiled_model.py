@@ -15,7 +15,7 @@ from scipy.optimize import minimize
 
 import softrobots as sr
 from softrobots.compiled import Status
-from softrobots.compiled.run import compiled_statics
+from softrobots.compiled.run import compiled_code
 from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.conftest import missing
 from tests.support.foreign import BRANCHED
@@ -707,8 +707,8 @@ def test_nothing_else_compiles_silently(arm: sr.SoftModel, monkeypatch: pytest.M
     def refuse(*_: Any, **__: Any) -> None:
         raise AssertionError("compiled without being asked")
 
-    monkeypatch.setattr(compiled_statics, "make_program", refuse)
-    monkeypatch.setattr(compiled_statics, "make_run", refuse)
+    monkeypatch.setattr(compiled_code, "make_program", refuse)
+    monkeypatch.setattr(compiled_code, "make_run", refuse)
     settled = sr.solve_equilibrium(arm, (0.1, 0.2, 0.3), (0.0, 5.0, -5.0))
     sr.estimate_load(arm, settled.q_motors, settled.motor_torques)
     sr.solve_ik(arm, (0.8, 0.1, 0.2), (0.0, 5.0, -5.0))

@@ -204,7 +204,6 @@ def test_what_has_no_friction_refuses_it() -> None:
     rest = model.relaxed_motors
     found = sr.solve_equilibrium(model, rest)
     for call in (
-        lambda: sr.compile(model),
         lambda: sr.vibration_modes(model, found),
         lambda: sr.critical_load(model, rest, (0.0, 0.0, -1.0)),
         lambda: sr.solve_imposed_displacement(model, rest, displacement=0.001, direction=(1.0, 0.0, 0.0)),

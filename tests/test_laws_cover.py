@@ -28,6 +28,7 @@ WITHOUT = {
     "description.third_party.robot_file": "a table of a package of data: test_model loads what is in it",
     "compiled.run.compiled_model.CompiledModel": "its methods have laws, under the name of the class",
     "compiled.run.compiled_statics.CompiledStatics": "its methods have laws, under the name of CompiledModel",
+    "compiled.run.compiled_code.CompiledCode": "its methods have laws, under the name of CompiledModel",
     "compiled.statuses.Status": "numbers with names",
     **dict.fromkeys((f"compiled.run.results.Compiled{name}" for name in ("Equilibrium", "LoadEstimate")), _RESULT),
     **dict.fromkeys((f"compiled.run.results.{name}Batch" for name in ("Equilibrium", "Load", "Motor")), _RESULT),

@@ -419,7 +419,9 @@ def test_compiled_searches_go_through_slack_walls(compiled: tuple) -> None:
 
 
 def test_compiled_solvers_refuse_by_name_what_they_cannot_have() -> None:
-    with pytest.raises(sr.ParameterError, match="at most 16 joints, without muscles, to be compiled with slack walls"):
+    with pytest.raises(
+        sr.ParameterError, match="at most 16 joints, without muscles or dry friction, to be compiled with slack walls"
+    ):
         sr.compile(sr.load_model(sr.InflatableArm(link_lengths=(0.3,) * 6, moment_law="slack_wall", stiffness=170.0)))
     one = sr.load_model(sr.InflatableArm(link_lengths=(0.6,), moment_law="slack_wall"))
     text = one.urdf.replace('springs="spring_1_side spring_1_up"', 'springs="spring_1_side"')

@@ -129,6 +129,7 @@ PAGES = {
         (
             *(f"softrobots.compiled.run.compiled_model.{name}" for name in ("compile_model", "CompiledModel")),
             "softrobots.compiled.run.compiled_statics.CompiledStatics",
+            "softrobots.compiled.run.compiled_code.CompiledCode",
             "softrobots.compiled.statuses.Status",
             *(f"softrobots.compiled.run.results.{name}" for name in ("CompiledEquilibrium", "CompiledLoadEstimate")),
             *(f"softrobots.compiled.run.results.{name}" for name in ("EquilibriumBatch", "LoadBatch", "MotorBatch")),

@@ -43,8 +43,8 @@ def read_chain(
 
     Raises:
         DescriptionError: If an inflated link has a plateau, a joint is not on the way from base to tip or neither turns nor
-            slides, the springs of a slack wall are not two that turn, one behind the other, or an actuator winds along a lumped
-            section whose joints are apart.
+            slides, the springs of a slack wall are not two that turn, one behind the other, or the joints
+            of a lumped section that has dry friction, or along which an actuator winds, are apart.
     """
     if any(group.max_moment is not None for group in groups):
         raise DescriptionError(
@@ -76,6 +76,7 @@ def read_chain(
         free=read_only(np.eye(count)) if given is None else given.free,
         slack_hinges=_slack_hinges(str(pinocchio_model.name), elements, groups),
         wound=_wound(str(pinocchio_model.name), elements, structure),
+        friction=_friction(structure),
     )
     return replace(chain, constrained=(), constrained_slope=read_only(np.zeros((0, muscles)))) if chain.routed else chain
 
@@ -113,18 +114,27 @@ def _slack_hinges(name: str, elements: Sequence[Element], groups: Sequence[Sprin
     return tuple(found)
 
 
+def _friction(structure: Structure) -> tuple[tuple[int, int, float], ...]:
+    """The sections with dry friction of bending, see `SerialChain.friction`."""
+    friction = structure.friction
+    rows = () if friction is None else zip(friction.places.tolist(), friction.limit.tolist(), strict=True)
+    return tuple((*places, limit) for places, limit in rows)
+
+
 def _wound(name: str, elements: Sequence[Element], structure: Structure) -> tuple[tuple[int, int], ...]:
-    """The joints of lumped sections along which actuators wind, see `SerialChain.wound`."""
+    """The joints of lumped sections that are one element, see `SerialChain.wound`."""
     paths, found = structure.muscle_paths, []
-    winding = {one for one, straight in zip(paths.sections, paths.separable, strict=True) if paths.lumped and not straight}
-    row_of = {element.strain: row for row, element in enumerate(elements) if winding and isinstance(element, ChainJoint)}
+    joined = {one for one, straight in zip(paths.sections, paths.separable, strict=True) if paths.lumped and not straight}
+    rubbing = {place for place, *_ in _friction(structure)}
+    joined |= {one.name for one in structure.section_table if one.lumped and rubbing & set(one.places.values())}
+    row_of = {element.strain: row for row, element in enumerate(elements) if joined and isinstance(element, ChainJoint)}
     for section in structure.section_table:
-        if section.name in winding:
+        if section.name in joined:
             rows = sorted(row_of[place] for place in section.places.values())
             if rows[-1] - rows[0] >= len(rows) or any(np.any(elements[row].translation) for row in rows[1:]):
                 raise DescriptionError(
-                    f"{name} has actuators that wind along section {section.name}, whose joints are apart; compiled solvers "
-                    "need them at one point, one behind the other"
+                    f"{name} has dry friction or actuators that wind along section {section.name}, whose joints are apart; "
+                    "compiled solvers need them at one point, one behind the other"
                 )
             found.append((rows[0], rows[-1]))
     return tuple(found)

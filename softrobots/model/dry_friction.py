@@ -17,8 +17,9 @@ A guide stands at each point of a route (`softrobots.description.route_points`),
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -69,8 +70,8 @@ class DryFriction:
         self._paths, self._count, self._relaxed = paths, len(relaxed), relaxed
         self.guided = bool(tags) and bool(guides)
         """Whether an actuator rubs in its guides."""
-        self.rounding = ROUNDING * np.pi * float(np.linalg.norm(self.limit)) / BENDING_STICK
-        """Rounding of the moments of friction [N m]: that of an angle times the stiffness of the stick."""
+        self.rounding = rounding_of(self.limit)
+        """Rounding of the moments of friction [N m]."""
         self.coefficient = np.zeros(0)
         """Coefficient of friction of each guide, shape (n_guides,) [-]."""
         self.n_guides = len(paths.muscle) if self.guided else 0
@@ -166,6 +167,11 @@ class DryFriction:
     def _slipped(self, pieces: FloatArray, memory: FrictionMemory) -> FloatArray:
         """Displacement of the actuators from the sliders of their guides, shape (n_guides,) [m]."""
         return np.asarray(memory.slip + self._beyond @ (memory.pieces - pieces))
+
+
+def rounding_of(limits: Any) -> float:
+    """Return the rounding of moments of friction of sections [N m]: that of an angle times the stiffness of the stick."""
+    return ROUNDING * math.pi * float(np.linalg.norm(limits)) / BENDING_STICK
 
 
 def _dissipated(size: FloatArray, stick: FloatArray | float) -> FloatArray:

@@ -82,6 +82,8 @@ class ChainHinge:
 Element: TypeAlias = ChainJoint | ChainSection
 """Joint or section."""
 
+_LUMPED = (ChainJoint, ChainHinge)
+
 
 @dataclass(frozen=True, eq=False)
 class SerialChain:
@@ -132,7 +134,9 @@ class SerialChain:
     slack_hinges: tuple[tuple[int, int, float], ...] = ()
     """The two strains, base to tip, of each hinge of an inflated link whose wall goes slack, and the moment of that [N m]."""
     wound: tuple[tuple[int, int], ...] = ()
-    """First and last joint of each lumped section along which an actuator winds, base to tip."""
+    """First and last joint of each lumped section that has dry friction or along which an actuator winds, base to tip."""
+    friction: tuple[tuple[int, int, float], ...] = ()
+    """The two strains of bending of each section with dry friction, and the moment of that [N m]."""
 
     @cached_property
     def joined(self) -> SerialChain:
@@ -158,8 +162,10 @@ class SerialChain:
     def routed(self) -> bool:
         """Whether an actuator is not of given length or tension, winds, or passes other sections than those it overlaps.
 
-        Also where lengths constrain other combinations of strains than sums.
+        Also where lengths constrain other combinations of strains than sums, or lumped sections have dry friction.
         """
+        if self.actuators and any(isinstance(self.elements[self.element_of[one]], _LUMPED) for one, *_ in self.friction):
+            return True
         if any(one.kind not in ("length", "tension") or not one.straight for one in self.actuators):
             return True
         if self.actuators and self.muscle_input == "lengths" and not self.constrained:

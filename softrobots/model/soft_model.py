@@ -279,8 +279,8 @@ class SoftModel(SummarisedRobot):
 
         Raises:
             DescriptionError: If a joint is not between base and tip, or neither turns nor slides, if an inflated link has a
-                plateau, or a slack wall with other springs than two that turn, one behind the other, or if an actuator winds
-                along a lumped section whose joints are apart.
+                plateau, or a slack wall with other springs than two that turn, one behind the other, or if the joints of a
+                lumped section that has dry friction, or along which an actuator winds, are apart.
         """
         return self._chain
 

@@ -16,6 +16,7 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.compiled.chain.dry_friction import Rubbing
 from softrobots.compiled.chain.elements import Load, symmetric, vector
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, RouteSums
 from softrobots.compiled.chain.layout import Layout, RecursionLayout
@@ -61,7 +62,7 @@ def element_signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
     routed = unknowns.routed and unknowns.segment_at(row) is not None
     constraint = -1 if routed else unknowns.multipliers_at(row)
     muscles = [(muscle.number, muscle.twists, [arm == 0.0 for arm in muscle.arms]) for muscle in one.muscles]
-    return *_signature(one), constraint, str(muscles)
+    return *_signature(one), constraint, str(muscles), () if one.rubbing is None else one.rubbing.places
 
 
 def _signature(one: TracedElement) -> tuple[Any, ...]:
@@ -120,6 +121,10 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
                 result.beyond.n_negative_pivots,
             ],
         )
+        if element.rubbing is not None:
+            slid = element.rubbing.at([element.coordinates[one] for one in element.moving]).sliders
+            for place, slider in zip(element.rubbing.places, slid, strict=True):
+                back.store(layout.slid - layout.unknown + place, slider, "q")
         second = _store_step(step_pass, result, plan, held, routes is not None)
     else:
         second = store_tip_step(step_pass, back, result, plan, tip, multipliers, routes is not None)
@@ -206,9 +211,11 @@ def _store_step(step_pass: Block, result: InwardPass, plan: Plan, held: Sequence
 
 def _common(ones: Sequence[TracedElement], plan: Plan, block: Block, columns: TableColumns, first: int = 0) -> TracedElement:
     """Return an element of a kind, with table entries for the numbers in which its elements differ."""
+    rubbing = _rubbing([one.rubbing for one in ones], plan.layout, block, columns)
     if ones[0].members:
         alike = zip(*(one.members for one in ones), strict=True)
-        return hinge([_common(members, plan, block, columns, place) for place, members in enumerate(alike)])
+        members = [_common(members, plan, block, columns, place) for place, members in enumerate(alike)]
+        return replace(hinge(members), rubbing=rubbing)
     unknown = iter(block.loads(first, max(len(ones[0].moving), 1), "q"))
     coordinates = [
         next(unknown)
@@ -221,7 +228,17 @@ def _common(ones: Sequence[TracedElement], plan: Plan, block: Block, columns: Ta
         mass_beyond=columns.entry([one.mass_beyond for one in ones]),
         coordinates=coordinates,
         rest=_relaxed(ones, block, plan.layout, columns),
+        rubbing=rubbing,
     )
+
+
+def _rubbing(ones: Sequence[Rubbing | None], layout: Layout, block: Block, columns: TableColumns) -> Rubbing | None:
+    """Return the dry friction of a kind, with its sliders in the workspace; None if it has none."""
+    rubbing = [one for one in ones if one is not None]
+    if not rubbing:
+        return None
+    sliders = [block.load(layout.sliders - layout.unknown + place, "q") for place in rubbing[0].places]
+    return Rubbing(columns.entry([one.limit for one in rubbing]), rubbing[0].places, sliders)
 
 
 def table_element(ones: Sequence[TracedElement], columns: TableColumns) -> TracedElement:

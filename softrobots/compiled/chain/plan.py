@@ -46,7 +46,8 @@ class Plan:
         """Places of the numbers of a case."""
         unknowns, conditions = self.unknowns, 6 if self.poses else 3
         counts = unknowns.n_tensions, unknowns.n_constraints, 0 if self.inputs is None else self.inputs.count
-        return Layout(unknowns.chain.n_motors, len(unknowns.strains), conditions, *counts)
+        rubbing = len(unknowns.strains) if unknowns.chain.friction else 0
+        return Layout(unknowns.chain.n_motors, len(unknowns.strains), conditions, *counts, rubbing)
 
     @cached_property
     def recursion(self) -> RecursionLayout:

@@ -163,6 +163,10 @@ def inward(
     stiffness = pulls.curvature[np.ix_(moving, moving)] - motion.curvature
     if element.routes is not None:
         stiffness, gradient = stiffness + element.routes.curvature, [*(vector(gradient) + element.routes.load)]
+    if element.rubbing is not None:
+        friction = element.rubbing.at([element.coordinates[row] for row in moving])
+        balance.energy = balance.energy + friction.energy
+        gradient, stiffness = [*(vector(gradient) + friction.torque)], stiffness + friction.stiffness
     for place, own in enumerate(element.stiffness):
         stiffness[place, place] = stiffness[place, place] + (own if law is None else law.stiffness)
     sides = [gradient, *(-np.concatenate([motion.moves, motion.twists])[:tip_columns]).tolist()]

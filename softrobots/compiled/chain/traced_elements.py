@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from softrobots.compiled.chain.dry_friction import Rubbing
 from softrobots.compiled.chain.elimination import RouteSums
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.trace.expressions import Scalar
@@ -60,6 +61,8 @@ class TracedElement:
     """Part of it that the start of the springs accounts for; with given lengths [N]."""
     routes: RouteSums | None = None
     """What actuators on routes add."""
+    rubbing: Rubbing | None = None
+    """Its dry friction."""
     members: Sequence[TracedElement] = ()
     """The joints of a `hinge`, base to tip."""
 

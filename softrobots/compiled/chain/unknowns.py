@@ -10,6 +10,7 @@ from typing import NamedTuple
 
 import numpy as np
 
+from softrobots.compiled.chain.dry_friction import Rubbing
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.muscle_terms import ElementMuscle
 from softrobots.compiled.chain.traced_elements import TracedElement, hinge
@@ -19,6 +20,7 @@ from softrobots.compiled.trace.expressions import Scalar, scalar
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.model.actuator_laws import ROUNDING, ActuatorLaws
+from softrobots.model.dry_friction import rounding_of
 from softrobots.model.serial_chain import ChainHinge, ChainJoint, ChainSection, Element, SerialChain, bodies_of, strains_of
 
 STRETCHED = ("elastic", "mckibben")
@@ -69,13 +71,12 @@ class Unknowns:
         if clash:
             raise ParameterError("locked_strains", self.locked, f"without {', '.join(clash)}, which muscle lengths constrain")
         if self.chain.rest.size and float(np.abs(self.chain.rest).max()) > LARGEST_POSITION:
-            raise ParameterError(
-                "model",
-                self.chain.name,
-                f"a robot with rest positions of springs within +-{LARGEST_POSITION:g} rad or m, to be compiled",
-            )
+            requirement = f"a robot with rest positions of springs within +-{LARGEST_POSITION:g} rad or m, to be compiled"
+            raise ParameterError("model", self.chain.name, requirement)
         if self.chain.slack_hinges and not self.is_unrolled:
-            requirement = f"a chain of at most {MAX_UNROLLED_JOINTS} joints, without muscles, to be compiled with slack walls"
+            requirement = (
+                f"at most {MAX_UNROLLED_JOINTS} joints, without muscles or dry friction, to be compiled with slack walls"
+            )
             raise ParameterError("model", self.chain.name, requirement)
         if self.locked and not self._locked_strains:
             raise ParameterError("locked_strains", self.locked, "empty for a robot without sections of constant strain")
@@ -156,9 +157,11 @@ class Unknowns:
         chain = self.chain if numbers is None else numbers
         element: Element | ChainHinge = chain.elements[row]
         if isinstance(element, ChainHinge):
-            pairs = zip(element.joints, element.masses_beyond, strict=True)
-            return hinge([self._traced(chain, joint, mass, motor, unknown) for joint, mass in pairs])
-        return replace(self._traced(chain, element, chain.masses_beyond[row], motor, unknown), muscles=self._muscles(row))
+            joints = zip(element.joints, element.masses_beyond, strict=True)
+            one = hinge([self._traced(chain, *joint, motor, unknown) for joint in joints])
+        else:
+            one = self._traced(chain, element, chain.masses_beyond[row], motor, unknown)
+        return replace(one, muscles=self._muscles(row), rubbing=Rubbing.of(chain.friction, self.moving(row)))
 
     def _traced(
         self,
@@ -249,9 +252,9 @@ class Unknowns:
 
     @property
     def is_unrolled(self) -> bool:
-        """Whether the chain is unrolled: few joints, no sections and no muscles."""
-        sections = any(isinstance(element, ChainSection) for element in self.chain.elements)
-        return not sections and len(self.chain.muscle_paths.rest) == 0 and len(self.chain.elements) <= MAX_UNROLLED_JOINTS
+        """Whether the chain is unrolled: few joints, no sections, no muscles and no dry friction."""
+        looped = self.chain.friction or any(isinstance(element, ChainSection) for element in self.chain.elements)
+        return not looped and len(self.chain.muscle_paths.rest) == 0 and len(self.chain.elements) <= MAX_UNROLLED_JOINTS
 
     @property
     def moved_by_motors(self) -> bool:
@@ -260,16 +263,14 @@ class Unknowns:
 
     @property
     def spring_rounding(self) -> float:
-        """Rounding of the torques of springs and stiff tendons [N m], see `SoftModel.rounding`."""
-        chain, strains, held = self.chain, list(self.strains), 0.0
+        """Rounding of the torques of springs, stiff tendons and dry friction [N m], see `SoftModel.rounding`."""
+        chain, strains = self.chain, list(self.strains)
+        rounding = ActuatorLaws(chain.actuators).rounding + rounding_of([limit for *_, limit in chain.friction])
         if self.held_lengths:  # rounding of each length, over its change by its own tension
             softness = (chain.muscle_paths.at(chain.rest).arms ** 2 / chain.stiffness).sum(axis=1)
-            held = float(np.linalg.norm(chain.muscle_paths.rest / softness)) * ROUNDING
-        return (
-            held
-            + ActuatorLaws(chain.actuators).rounding
-            + 8.0 * float(np.finfo(np.float64).eps) * float(np.linalg.norm(chain.stiffness[strains] * chain.rest[strains]))
-        )
+            rounding += float(np.linalg.norm(chain.muscle_paths.rest / softness)) * ROUNDING
+        rested = float(np.linalg.norm(chain.stiffness[strains] * chain.rest[strains]))
+        return rounding + 8.0 * float(np.finfo(np.float64).eps) * rested
 
     def multipliers_at(self, row: int) -> int:
         """Return the number of multipliers of the segment of an element; 0 outside of constrained segments."""

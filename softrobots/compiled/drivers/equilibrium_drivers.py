@@ -232,7 +232,7 @@ def settle(w: Array) -> int:
     """Find the equilibrium from rest by Newton passes, or by descent where they fail; return the status."""
     if not is_usable(w):
         return NOT_A_NUMBER
-    if N_CONSTRAINTS > 0:
+    if N_CONSTRAINTS + N_SLIDERS > 0:
         go_to_start(w)
     first_pass(w)
     for _ in range(PASSES):

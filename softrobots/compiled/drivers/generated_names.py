@@ -21,6 +21,7 @@ NEUTRAL: int
 N: int
 N_MOTORS: int
 N_CONSTRAINTS: int
+N_SLIDERS: int
 N_STARTS: int
 N_INPUTS: int
 N_MUSCLES: int

@@ -78,7 +78,7 @@ def is_solved(w: Array, lane: int) -> bool:
 def settle_batch(
     inputs: Rows, places: Places, outputs: Rows, result_places: Places, statuses: Any, first: int, last: int
 ) -> None:
-    """Find equilibria, each from rest."""
+    """Find equilibria, each from rest, with dry friction from the unknowns given."""
     lanes = zeros(LANE_SIZE * LANES)
     case = zeros(WORKSPACE_SIZE)
     for begin in range(first, last, LANES):
@@ -94,7 +94,8 @@ def settle_batch(
             if not is_solved(lanes, lane):
                 load_case(case, inputs, places, begin + lane)
                 prepare(case)
-                go_to_start(case)
+                if N_SLIDERS == 0:
+                    go_to_start(case)
                 statuses[begin + lane] = settle_from(case)
                 store_case(case, outputs, result_places, begin + lane)
 

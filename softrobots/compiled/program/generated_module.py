@@ -139,6 +139,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "LANES": lane_count(lane_size),
         "N_CONSTRAINTS": unknowns.n_constraints,
         "N_STARTS": layout.unknowns if unknowns.n_constraints or layout.inputs else 0,
+        "N_SLIDERS": layout.rubbing,
         "N_INPUTS": unknowns.n_tensions,
         "LEAST_INPUT": unknowns.least_inputs,
         **{status.name: status.value for status in Status},

@@ -110,7 +110,7 @@ def first_pass_SUFFIX(w: Array) -> None:
     """Prepare, evaluate the robot at its start, and take a Newton step."""
     prepare_SUFFIX(w)
     start_SUFFIX(w)
-    if N_CONSTRAINTS == 0:
+    if N_CONSTRAINTS + N_SLIDERS == 0:
         for i in range(N):
             relax_SUFFIX(w, i)
     newton_pass_SUFFIX(w)'''

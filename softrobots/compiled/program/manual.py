@@ -69,6 +69,14 @@ def _inputs(plan: Plan) -> list[Place]:
     starts = "for settle_from, reach and follow" if searches else "for settle_from"
     held = ", with the muscle lengths, as in START" if unknowns.n_constraints else ""
     places.append(Place("UNKNOWN", n, f"start of the search [rad or m]; {starts}{held}"))
+    if layout.rubbing:
+        places.append(
+            Place(
+                "SLIDERS",
+                n,
+                "sliders of dry friction, at the places of the unknowns that bend [rad]: at rest, then the last SLID",
+            )
+        )
     if searches:
         places.append(Place("TORQUES", layout.motors, "load on each motor, minus what it exerts [N m or N]; for estimate"))
         turned = ", and its rotation matrix, row by row" if plan.poses else ""
@@ -85,6 +93,8 @@ def _results(plan: Plan, tip: TipLayout | None) -> list[Place]:
         Place("TIP", 3, "the loaded tip [m], world axes"),
         Place("ERROR", 1, "square of the out-of-balance torque [N^2 m^2]"),
     ]
+    if plan.layout.rubbing:
+        places.append(Place("SLID", n, "the sliders after the step from SLIDERS to this equilibrium [rad]"))
     if unknowns.moved_by_motors:
         places += [
             Place("FORCE", 3, "the force [N], world axes; of estimate"),

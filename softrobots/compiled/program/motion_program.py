@@ -14,6 +14,7 @@ from softrobots.compiled.program.looped_motion_program import looped_motion
 from softrobots.compiled.program.manual import Place, inputs_of, motor_names, on_a_line, place_table, strain_names
 from softrobots.compiled.program.motion_parts import unrolled_motion
 from softrobots.compiled.statuses import Status
+from softrobots.core.errors import ParameterError
 
 _STATUSES = {
     Status.CERTIFIED: "the step was taken",
@@ -22,7 +23,14 @@ _STATUSES = {
 
 
 def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order: int = 2) -> Program:
-    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix; `order`: of the steps."""
+    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix; `order`: of the steps.
+
+    Raises:
+        ParameterError: If it has dry friction.
+    """
+    if unknowns.chain.friction:
+        requirement = "a robot without dry friction, for compiled motion; simulate has it, bending_friction=0 leaves it out"
+        raise ParameterError("model", unknowns.chain.name, requirement)
     plan = MotionPlan(in_motion(unknowns), full_damping, order)
     layout = plan.layout
     parts = unrolled_motion(plan) if plan.unknowns.is_unrolled else looped_motion(plan)

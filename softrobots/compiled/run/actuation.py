@@ -35,6 +35,26 @@ class Actuation:
         self._shares = np.zeros((len(chain.constrained), len(chain.stiffness)))  # of each strain in the sums
         for row, group in zip(self._shares, map(list, chain.constrained), strict=True):
             row[group] = 1.0 / chain.stiffness[group] / float((1.0 / chain.stiffness[group]).sum())
+        strains = [bending for *bending, _ in chain.friction]
+        self.rest_bending = chain.rest[np.array(strains, dtype=np.intp).reshape(-1, 2)]
+        """Bending at rest of the sections with dry friction, shape (n_sections, 2) [rad]."""
+        pairs = [(row, side, unknowns.place.get(one)) for row, pair in enumerate(strains) for side, one in enumerate(pair)]
+        rubbing = [one for one in pairs if one[2] is not None]
+        self._rubbing = np.array(rubbing, dtype=np.intp).reshape(-1, 3).T  # section, side, and place among the unknowns
+
+    def sliders(self, bending: FloatArray) -> FloatArray:
+        """Return the sliders of dry friction, shape (n, n_unknowns), from their bending, shape (n, n_sections, 2) [rad]."""
+        sections, sides, places = self._rubbing
+        sliders = np.zeros((len(bending), len(self._strains)))
+        sliders[:, places] = bending[:, sections, sides]
+        return sliders
+
+    def bending(self, sliders: FloatArray) -> FloatArray:
+        """Return the opposite of `sliders`; locked strains are at rest."""
+        sections, sides, places = self._rubbing
+        bending = np.tile(self.rest_bending, (len(sliders), 1, 1))
+        bending[:, sections, sides] = sliders[:, places]
+        return bending
 
     def workspace(self, run: Any, motors: FloatArray, **numbers: FloatArray) -> Any:
         """Return a workspace of one case: actuators, start, and other numbers by the name of their place in the layout."""
@@ -162,7 +182,9 @@ class Actuation:
             paths, slope = self._chain.muscle_paths, self._chain.constrained_slope
             straight = strains = strains + (motors[:, self._count :] - paths.rest) @ self._chain.spread.T
             for _ in range(_CLOSING_STEPS):
-                strains = straight - paths.at(strains).excess @ slope.T @ self._shares
+                last, strains = strains, straight - paths.at(strains).excess @ slope.T @ self._shares
+                if np.array_equal(last, strains):  # at once where nothing is twisted
+                    break
         return np.asarray(strains[:, self._strains])
 
     def elastic(self, unknowns: FloatArray) -> FloatArray:

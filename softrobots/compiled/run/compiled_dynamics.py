@@ -16,8 +16,9 @@ from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks
 from softrobots.compiled.run.motion_damping import MotionDamping
+from softrobots.compiled.run.motion_results import CompiledMotion, StepEnd
 from softrobots.compiled.run.motion_runs import StepsTaken, first_grid, halve_to_tolerance, replay, take_batch, take_one
-from softrobots.compiled.run.results import CompiledMotion, MotionBatch, StepEnd
+from softrobots.compiled.run.results import MotionBatch
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
 from softrobots.core.errors import NotConverged

@@ -11,6 +11,7 @@ from softrobots.compiled.run.backends import BACKENDS, available_backend
 from softrobots.compiled.run.batches import batch_rows, fail, flat_targets, gravity_vector, unusable, without
 from softrobots.compiled.run.compiled_dynamics import CompiledDynamics
 from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE
+from softrobots.compiled.run.friction_states import StatesBefore
 from softrobots.compiled.run.looped_search import LoopedSearch
 from softrobots.compiled.run.results import CompiledLoadEstimate, LoadBatch, MotorBatch
 from softrobots.compiled.run.unrolled_search import UnrolledSearch
@@ -19,7 +20,7 @@ from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import choice, finite_array, positive_integer, positive_number
 from softrobots.core.errors import LoadNotFound, ParameterError, TargetUnreachable
 from softrobots.model.friction_coordinates import check_frictionless
-from softrobots.model.soft_model import SoftModel
+from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
 from softrobots.statics.load_estimation import check_feels
 from softrobots.statics.tip_search import POSITION_TOLERANCE
@@ -40,12 +41,17 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
         Its solvers. numba compiles each of them on its first call.
 
     Raises:
-        ParameterError: If the model is not a SoftModel, the back end is unknown, or strains cannot be locked.
+        ParameterError: If the model is not a SoftModel, actuators rub in their guides, the back end is unknown, or strains
+            cannot be locked.
         NameNotFound: If a strain to lock does not exist.
         DescriptionError: If the robot is not a serial chain with linear springs.
         MissingDependency: If `backend` is "numba" and numba is not installed.
     """
-    check_frictionless(model, "compiled solvers")
+    if check_model(model).structure.guided:
+        requirement = (
+            "a robot without friction in guides, to be compiled; solve_equilibrium has it, guide_friction=0 leaves it out"
+        )
+        raise ParameterError("model", model.pinocchio.name, requirement)
     chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
     if isinstance(locked_strains, str) or not isinstance(locked_strains, Iterable):
         raise ParameterError("locked_strains", locked_strains, f"a tuple of names, of {', '.join(STRAINS)}")
@@ -56,8 +62,8 @@ class CompiledModel(CompiledDynamics):
     """Compiled solvers of a robot, for single cases and for batches; made by `softrobots.compile`.
 
     Loads are a dead force on the tip and gravity, in world axes. Angles, signs and tolerances are those of
-    `softrobots.solve_equilibrium`; of several equilibria the result is the one that descent from rest reaches. Safe to share
-    between threads.
+    `softrobots.solve_equilibrium`; of several equilibria the result is the one that descent from rest reaches, or with dry
+    friction from the state before. Safe to share between threads.
     """
 
     def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
@@ -66,7 +72,9 @@ class CompiledModel(CompiledDynamics):
         self._estimate, self._torques = self._run(False).estimate, self._layout.torques
         self._plain_estimate = self._plain and self._unknowns.moved_by_motors
 
-    def estimate_load(self, q_motors: Any, motor_torques: Any, *, gravity: Any = None) -> CompiledLoadEstimate:
+    def estimate_load(
+        self, q_motors: Any, motor_torques: Any, *, gravity: Any = None, previous: Any = None
+    ) -> CompiledLoadEstimate:
         """Find the force on the tip from the motor torques.
 
         Near poses in which one direction of the force is hardly observable, several forces can explain the same torques, and
@@ -76,6 +84,7 @@ class CompiledModel(CompiledDynamics):
             q_motors: Motor coordinates, shape (n_motors,) [rad or m].
             motor_torques: Load on each motor, shape (n_motors,) [N m or N], with the sign of `Equilibrium.motor_torques`.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+            previous: Where a robot with dry friction comes from, see `equilibrium`.
 
         Returns:
             The force, and the robot in equilibrium under it.
@@ -88,6 +97,7 @@ class CompiledModel(CompiledDynamics):
         if (
             self._plain_estimate
             and gravity is None
+            and previous is None
             and type(q_motors) is np.ndarray
             and type(motor_torques) is np.ndarray
             and q_motors.dtype is DOUBLE
@@ -100,14 +110,15 @@ class CompiledModel(CompiledDynamics):
             w[self._torques : self._torques + self._motors] = motor_torques
             if self._estimate(w) == 0:
                 return CompiledLoadEstimate(w, self._layout, self._actuation)
-        return self._checked_estimate(q_motors, motor_torques, gravity)
+        return self._checked_estimate(q_motors, motor_torques, gravity, previous)
 
-    def _checked_estimate(self, q_motors: Any, motor_torques: Any, gravity: Any) -> CompiledLoadEstimate:
+    def _checked_estimate(self, q_motors: Any, motor_torques: Any, gravity: Any, previous: Any) -> CompiledLoadEstimate:
         check_feels(self._model)
         run = self._run(gravity is not None)
         motors = self._actuation.checked(q_motors)
         torques = self._model.actuators.checked_loads(motor_torques, "motor_torques")
-        status, w = self._search(run).estimate(motors, torques, gravity_vector(gravity))
+        search = self._search(run, self._before(previous, single=True))
+        status, w = search.estimate(motors, torques, gravity_vector(gravity))
         estimate = CompiledLoadEstimate(w, run.layout, self._actuation, motors, Status(status))
         if status != Status.CERTIFIED:
             raise LoadNotFound(
@@ -132,10 +143,10 @@ class CompiledModel(CompiledDynamics):
             One row a case.
 
         Raises:
-            ParameterError: If a shape differs, gravity is not finite, or the robot has no actuators or muscles of given
-                tension.
+            ParameterError: If a shape differs, gravity is not finite, or the robot has no actuators, muscles of given
+                tension, or dry friction.
         """
-        check_feels(self._model)
+        check_feels(check_frictionless(self._model, "compiled batches of estimates (estimate_load takes it)"))
         run = self._run(gravity is not None)
         named = self._model.actuators.in_order
         motors, torques = batch_rows(
@@ -183,9 +194,10 @@ class CompiledModel(CompiledDynamics):
 
         Raises:
             ParameterError: If a shape differs, a pose has no rotation, gravity, tolerance or a count is out of range, or the
-                robot has no actuators; for poses also if it has less than six motors, sections, muscles or a long chain.
+                robot has no actuators, or dry friction; for poses also if it has less than six motors, sections, muscles or a
+                long chain.
         """
-        relaxed = start_motors(self._model, None)
+        relaxed = start_motors(check_frictionless(self._model, "compiled inverse kinematics"), None)
         goals, poses = flat_targets(targets)
         run = self._run(gravity is not None, poses)
         positive_number("tolerance", tolerance, "m")
@@ -240,11 +252,11 @@ class CompiledModel(CompiledDynamics):
             Motors, elastic coordinates and errors of the waypoints; see the status of each.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators, or cannot have poses; see
-                `inverse_kinematics`.
+            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators, dry friction, or cannot
+                have poses; see `inverse_kinematics`.
             TargetUnreachable: If the first waypoint cannot be reached; from `solve_ik` if no start is given.
         """
-        start_motors(self._model, None)
+        start_motors(check_frictionless(self._model, "compiled paths"), None)
         goals, poses = flat_targets(targets)
         run = self._run(gravity is not None, poses)
         (points,) = batch_rows(targets=(goals, run.layout.target_size))
@@ -271,7 +283,8 @@ class CompiledModel(CompiledDynamics):
             )
         return batch
 
-    def _search(self, run: Any) -> UnrolledSearch | LoopedSearch:
-        """Return the searches for forces and motors: generated code, or Python on top of it."""
-        kind = UnrolledSearch if self._unknowns.is_unrolled else LoopedSearch
-        return kind(self._model, self._actuation, run)
+    def _search(self, run: Any, before: StatesBefore | None = None) -> UnrolledSearch | LoopedSearch:
+        """Return the searches for forces and motors: generated code, or Python on top of it, from a state before."""
+        if self._unknowns.is_unrolled:
+            return UnrolledSearch(self._model, self._actuation, run)
+        return LoopedSearch(self._model, self._actuation, run, before)

@@ -1,26 +1,23 @@
-"""Compiled equilibria of a robot without Pinocchio in the loop, and the generated code that finds them."""
+"""Compiled equilibria of a robot without Pinocchio in the loop."""
 
 from __future__ import annotations
 
-import re
 from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.program.generated_module import make_program
-from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
 from softrobots.compiled.run.certified import certified
+from softrobots.compiled.run.compiled_code import CompiledCode
 from softrobots.compiled.run.contact_batches import ContactSolver
+from softrobots.compiled.run.friction_states import StatesBefore, states_before
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
-from softrobots.core.checks import FloatArray, finite_array, positive_integer, read_only
+from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
-from softrobots.dynamics.step_control import order_of_steps
 from softrobots.environment.environment import Environment
+from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 
 NO_FORCE = read_only(np.zeros(3))
@@ -30,19 +27,16 @@ DOUBLE = np.dtype(np.float64)
 _THREE = (3,)
 
 
-class CompiledStatics:
-    """Compiled equilibria of a robot, for single cases and for batches, and their generated code.
+class CompiledStatics(CompiledCode):
+    """Compiled equilibria of a robot, for single cases and for batches.
 
     See `softrobots.compiled.run.compiled_model.CompiledModel`, which adds load estimation and inverse kinematics.
     """
 
     def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
         """Generate and load the code; call `softrobots.compile` instead."""
-        self._model, self._backend = model, backend
-        self._chain = model.chain()
-        self._unknowns = Unknowns(self._chain, locked_strains)
+        super().__init__(model, backend, locked_strains)
         self._actuation = Actuation(model, self._unknowns)
-        self._runs: dict[tuple[bool, bool], Any] = {}
         self._shape = (model.n_motors,)
         self._motors = model.n_motors
         run = self._run(False)
@@ -51,109 +45,8 @@ class CompiledStatics:
         self._heavy: Any = None  # the same of the code with weight, once it is made
         self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
-        self._plain = not self._unknowns.n_constraints and backend == "numba"
+        self._plain = not self._unknowns.n_constraints and not self._layout.rubbing and backend == "numba"
         self._joints = self._chain.n_motors
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle as the robot and its options; the other process compiles it again, or finds the code in its cache."""
-        return type(self), (self._model, self._backend, self._unknowns.locked)
-
-    def __repr__(self) -> str:
-        """The robot and the back end."""
-        return f"{type(self).__name__}({self._chain.name!r}, backend={self._backend!r})"
-
-    @property
-    def model(self) -> SoftModel:
-        """The robot."""
-        return self._model
-
-    @property
-    def backend(self) -> str:
-        """The back end: "numba" or "python"."""
-        return self._backend
-
-    @property
-    def unknowns(self) -> Unknowns:
-        """Its chain and unknown strains."""
-        return self._unknowns
-
-    def source(self, *, gravity: bool = False, lanes: bool = False, motion: bool = False) -> str:
-        """Return the generated code as Python runs it.
-
-        Args:
-            gravity: Return the code for robots with weight.
-            lanes: Append the functions for batches.
-            motion: Return the code of motion instead, which always has gravity.
-
-        Raises:
-            ParameterError: If motion is asked for and that of its actuators is not compiled.
-        """
-        program = make_motion_program(self._unknowns) if motion else self._run(gravity).program
-        return str(program.text + ("\n\n" + program.lane_text if lanes else ""))
-
-    def c_source(
-        self,
-        *,
-        gravity: bool = False,
-        prefix: str = "softrobots",
-        poses: bool = False,
-        motion: bool = False,
-        order: int = 2,
-    ) -> str:
-        """Return the generated code as freestanding C99: one file without libraries, allocation or state, for a control loop.
-
-        Every function works on an array of doubles that the caller owns. The comment at the head of the file lists inputs and
-        results with their places and units, and the meaning of each status. `settle` finds equilibria of every robot;
-        `estimate`, `reach` and `follow` exist for unrolled chains; `motion_step` takes a step of time.
-
-        Args:
-            gravity: Return the code for robots with weight.
-            prefix: Beginning of every name, before an underscore.
-            poses: Return the code whose targets are poses.
-            motion: Return the code of motion instead of that of statics; it always has gravity.
-            order: Order of the steps of motion: 2, or 4 for motors that stand still.
-
-        Raises:
-            ParameterError: If the prefix is not an identifier of C, the robot cannot have poses as targets, or motion is asked
-                for and that of its actuators is not compiled.
-        """
-        from softrobots.compiled.translate.c import to_c
-
-        if not isinstance(prefix, str) or not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", prefix):
-            raise ParameterError("prefix", prefix, "ASCII letters, digits and underscores, a letter first")
-        order_of_steps(order, None, self._model, still=True)
-        program = make_motion_program(self._unknowns, order=order) if motion else self._run(gravity, poses).program
-        return to_c(program.text, prefix=f"{prefix}_", exported=program.entry_points)
-
-    def js_source(self, *, gravity: bool = True, points: int = 4) -> str:
-        """Return a solver for a page, in JavaScript: one script without imports, that defines the function `makeSolver`.
-
-        `makeSolver()` returns an object with
-
-        - `name`; `actuators`, each `{name, unit, lower, upper, relaxed}` (a limit that is not there is null); `springs`, each
-          `{name, unit}`; `statuses`, by number `{name, text}`; `frames`, each `{name, kind, share}`;
-        - `solve({motors, force, gravity, from})`. Motors [rad, m, N or Pa] are an array or an object by name. Force [N] and
-          gravity [m/s^2], world axes, may be left out: none. `from` is an earlier result near which the search starts.
-
-        The result of `solve` has `status` and `statusText` (see `Status`), `tip` [m], `springs` (as `Equilibrium.q_springs`),
-        `residual` [N m], `minPivot` (the smallest pivot of the tangent stiffness, by its spring's own) and `placements`: for
-        each of `frames` a rotation matrix, row by row, and a position [m] in the world. Frames are those of joints,
-        Pinocchio's, of points along sections at a share of their length, and the tip. `links` has for each inflated link
-        `{name, moment, axialForce, slackMargin, wrinklingMargin}` as `Equilibrium.link_limits`, and `tensions` [N] are
-        those of `Equilibrium.muscle_forces`. Other numbers than finite ones throw a TypeError. With the status `NOT_A_NUMBER`
-        the other numbers mean nothing.
-
-        Args:
-            gravity: Write the code for robots with weight; it solves weightless ones, too.
-            points: Number of placements along a section.
-
-        Raises:
-            ParameterError: If `points` is not positive.
-        """
-        from softrobots.compiled.browser.script import script
-
-        positive_integer("points", points, 1000)
-        return script(self._model, self._unknowns, self._run(gravity).program, gravity=gravity, points=points)
 
     def equilibrium(
         self,
@@ -162,6 +55,7 @@ class CompiledStatics:
         *,
         gravity: Any = None,
         q_springs0: Any = None,
+        previous: Any = None,
         environment: Environment | None = None,
     ) -> CompiledEquilibrium:
         """Find the equilibrium under a force on the tip.
@@ -170,7 +64,9 @@ class CompiledStatics:
             q_motors: Actuator coordinates, shape (n_motors,) [rad, m or N]; fastest as an array of float64.
             force: Force on the tip, shape (3,) [N], world axes.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-            q_springs0: Start of the search, shape (n_springs,) [rad or m]; at rest by default.
+            q_springs0: Start of the search, shape (n_springs,) [rad or m]; by default `previous`, or at rest.
+            previous: Where a robot with dry friction comes from: an equilibrium of this or the general solver. None: nothing
+                has moved it yet.
             environment: Obstacles that the robot touches without friction, as in `equilibria`, from rest.
 
         Returns:
@@ -188,6 +84,7 @@ class CompiledStatics:
         if (
             self._plain
             and q_springs0 is None
+            and previous is None
             and type(q_motors) is np.ndarray
             and type(force) is np.ndarray
             and q_motors.dtype is DOUBLE
@@ -209,7 +106,7 @@ class CompiledStatics:
                     w[joints + 3 : joints + 6] = down
                 if settle(w) == 0:
                     return CompiledEquilibrium(w, layout, self._actuation)
-        return self._checked_equilibrium(q_motors, force, gravity, q_springs0)
+        return self._checked_equilibrium(q_motors, force, gravity, q_springs0, previous)
 
     def _plain_gravity(self, gravity: Any) -> FloatArray | None:
         """Return gravity that needs no check but that of the generated code: an array, or the tuple of the last call."""
@@ -227,33 +124,60 @@ class CompiledStatics:
             return vector
         return None
 
-    def _checked_equilibrium(self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any) -> CompiledEquilibrium:
+    def _checked_equilibrium(
+        self, q_motors: Any, force: Any, gravity: Any, q_springs0: Any, previous: Any
+    ) -> CompiledEquilibrium:
         run = self._run(gravity is not None)
         motors = self._actuation.checked(q_motors)
         load = finite_array("force", force, (3,), "N")
         w = self._actuation.workspace(run, motors, force=load, gravity=gravity_vector(gravity))
-        if q_springs0 is None:
+        springs = None if q_springs0 is None else finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
+        before = self._before(previous, single=True)
+        if before is not None:
+            run.put(w, run.layout.sliders, before.sliders[0])
+            springs = before.springs[0] if springs is None else springs
+        if springs is None:
             status = Status(run.settle(w))
         else:
-            springs = finite_array("q_springs0", q_springs0, (self._model.n_springs,), "rad")
             run.put(w, run.layout.unknown, self._actuation.unknowns(motors, springs))
             status = Status(run.settle_from(w))
         return certified(CompiledEquilibrium(w, run.layout, self._actuation, motors, status))
 
+    def _before(self, previous: Any, *, single: bool = False) -> StatesBefore | None:
+        """Return the states before a step, see `states_before`; None for a robot without dry friction."""
+        if self._layout.rubbing:
+            before = states_before(self._actuation, previous)
+            if single and (len(before.springs) != 1 or before.lost[0]):
+                raise ParameterError("previous", previous, "one equilibrium")
+            return before
+        if previous is not None:
+            raise ParameterError("previous", previous, "None for a robot without dry friction, which remembers nothing")
+        return None
+
     def _solver_in_contact(self) -> ContactSolver:
+        check_frictionless(self._model, "compiled contact")
         self._touching = self._touching or ContactSolver(self._model, self._unknowns, self._backend)
         return self._touching
 
     def equilibria(
-        self, q_motors: Any, forces: Any, *, gravity: Any = None, threads: int = 1, environment: Any = None
+        self,
+        q_motors: Any,
+        forces: Any,
+        *,
+        gravity: Any = None,
+        threads: int = 1,
+        previous: Any = None,
+        environment: Any = None,
     ) -> EquilibriumBatch:
-        """Find the equilibria of many cases, each from rest.
+        """Find the equilibria of many cases, each from rest or, with dry friction, from the state before.
 
         Args:
             q_motors: Actuator coordinates, shape (n, n_motors), or (n_motors,) for all cases [rad, m or N].
             forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             threads: Number of threads; more than one speeds up numba only.
+            previous: Where robots with dry friction come from: the result of the last step of as many robots, a sequence of
+                equilibria, or one for all, see `equilibrium`. A row whose state before is no equilibrium keeps its status.
             environment: Obstacles that the robot touches without friction, or a sequence of environments, one a case, as
                 `[env.at(way) for way in ways]`. For robots of joints with linear springs, without meshes and self-contact.
 
@@ -268,7 +192,10 @@ class CompiledStatics:
         """
         run = self._run(gravity is not None)
         rows = self._model.actuators.in_order(q_motors, "q_motors")
-        motors, loads = batch_rows(q_motors=(rows, self._model.n_motors), forces=(forces, 3))
+        before, counted = self._before(previous), {}
+        if before is not None and len(before.springs) != 1:
+            counted = {"previous": (before.springs, self._model.n_springs)}
+        motors, loads, *_ = batch_rows(q_motors=(rows, self._model.n_motors), forces=(forces, 3), **counted)
         down = gravity_vector(gravity)
         bad = unusable(motors, loads) | self._actuation.unsuited(motors)
         motors, loads = without(motors, bad, self._model.relaxed_motors), without(loads, bad)
@@ -278,23 +205,15 @@ class CompiledStatics:
         layout = run.layout
         inputs = [(layout.force, loads), (layout.gravity, down[None]), *self._actuation.rows(motors, layout)]
         results = [(layout.unknown, layout.unknowns), (layout.tip, 3), (layout.single("error"), 1)]
-        (unknowns, tips, squares), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
+        if before is not None:
+            springs = np.broadcast_to(before.springs, (len(motors), self._model.n_springs))
+            inputs += [(layout.sliders, before.sliders), (layout.unknown, self._actuation.of_elastic(motors, springs))]
+            results.append((layout.slid, layout.unknowns))
+        (unknowns, tips, squares, *slid), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
         residuals = root(squares)
-        fail(statuses, bad, [residuals], [unknowns, tips])
-        return EquilibriumBatch(self._actuation.elastic(unknowns), statuses, residuals, tips)
-
-    def _run(self, weight: bool, poses: bool = False) -> Any:
-        """Return the code with or without gravity, for positions or poses as targets, generated on first use.
-
-        Raises:
-            ParameterError: If the robot cannot have poses as targets.
-        """
-        run = self._runs.get((weight, poses))
-        if run is None:
-            if poses and not (self._unknowns.is_unrolled and self._chain.n_motors >= 6):
-                kind = f"{self._chain.n_motors} motors and {len(self._chain.elements)} joints and sections"
-                requirement = f"positions for this robot, it has {kind}; poses need six motors and a chain that is unrolled"
-                raise ParameterError("targets", "poses", f"{requirement} (softrobots.solve_ik takes poses of every robot)")
-            program = make_program(self._unknowns, weight=weight, poses=poses)
-            run = self._runs[weight, poses] = make_run(program, self._backend)
-        return run
+        fail(statuses, bad, [residuals], [unknowns, tips, *slid])
+        springs = self._actuation.elastic(unknowns)
+        if before is None:
+            return EquilibriumBatch(springs, statuses, residuals, tips)
+        statuses = np.where(before.lost, before.status, statuses).astype(np.uint8)
+        return EquilibriumBatch(springs, statuses, residuals, tips, friction_bending=self._actuation.bending(slid[0]))

@@ -13,6 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.friction_states import StatesBefore
 from softrobots.compiled.run.results import MotorBatch
 from softrobots.compiled.settings import HIDDEN, LEAST_SIZE, SEARCH_STEPS
 from softrobots.compiled.statuses import Status
@@ -42,16 +43,20 @@ class ChainState(NamedTuple):
 class LoopedSearch:
     """Searches for the force or the actuators, like the functions in `motor_drivers`."""
 
-    def __init__(self, model: SoftModel, actuation: Actuation, run: Any) -> None:
-        """Use the functions of a program with the response of the tip."""
+    def __init__(self, model: SoftModel, actuation: Actuation, run: Any, before: StatesBefore | None = None) -> None:
+        """Use the functions of a program with the response of the tip; `before`: where a robot with dry friction comes from."""
         self.model, self.actuation, self.run = model, actuation, run
+        self._start, self._given = model.rest, dict[str, Any]()
+        if before is not None:
+            self._start, self._given = before.springs[0], {"sliders": before.sliders[0]}
 
     def settle(
         self, q_motors: FloatArray, force: FloatArray, gravity: FloatArray, start: FloatArray
     ) -> tuple[Status, ChainState]:
         """Find the equilibrium from given elastic coordinates."""
         unknowns = self.actuation.unknowns(q_motors, start)
-        w = self.actuation.workspace(self.run, q_motors, force=force, gravity=gravity, unknown=unknowns)
+        given = self._given | {"force": force, "gravity": gravity, "unknown": unknowns}
+        w = self.actuation.workspace(self.run, q_motors, **given)
         status = Status(self.run.settle_from(w))
         return status, ChainState(w, self.actuation.elastic(self.unknowns(w)))
 
@@ -75,7 +80,7 @@ class LoopedSearch:
     def estimate(self, q_motors: FloatArray, torques: FloatArray, gravity: FloatArray) -> tuple[Status, Any]:
         """Find the force that explains motor torques; return the status, and a workspace as of `motor_drivers.estimate`."""
         problem = _MeasuredTorques(self, q_motors, torques, gravity)
-        status, state = self.settle(q_motors, np.zeros(3), gravity, self.model.rest)
+        status, state = self.settle(q_motors, np.zeros(3), gravity, self._start)
         single = self.run.layout.single
         if status != Status.CERTIFIED:
             return status, state.w

@@ -33,9 +33,12 @@ class NumpyBatches:
 
     def settle_batch(self, *batch: Any) -> None:
         """Find equilibria; see `lane_drivers`."""
-        for w, statuses, _ in self._blocks(*batch):
+        for w, statuses, given in self._blocks(*batch):
             for lane in self._run(w, statuses, "first_pass", "newton_pass"):
-                statuses[lane] = self._alone(w, lane, self._module.settle)
+                if self._module.N_SLIDERS:
+                    statuses[lane] = self._again(w, lane, given, self._module.settle_from)
+                else:
+                    statuses[lane] = self._alone(w, lane, self._module.settle)
 
     def estimate_batch(self, *batch: Any) -> None:
         """Estimate forces; see `lane_drivers`."""
@@ -52,9 +55,7 @@ class NumpyBatches:
             motors = np.reshape(w[: self._layout.motors], (self._layout.motors, -1)).T
             outside = np.any((motors < self._low - 1e-9) | (motors > self._high + 1e-9), axis=1)
             for lane in np.union1d(unsolved, np.flatnonzero(outside)):
-                for place, values in given.items():
-                    w[place][lane] = values[lane]
-                statuses[lane] = self._alone(w, lane, self._module.reach)
+                statuses[lane] = self._again(w, lane, given, self._module.reach)
 
     def respond_batch(self, name: str, *batch: Any) -> None:
         """Compute rates or weights by a straight-line function; see `response_drivers`."""
@@ -95,6 +96,12 @@ class NumpyBatches:
         statuses[:] = Status.CERTIFIED
         w[:] = [np.array(np.broadcast_to(one, len(statuses))) for one in w]  # constants are written once
         return np.flatnonzero(~((w[mode] > 0.5) & (w[mode] < 1.5)))
+
+    def _again(self, w: list[Any], lane: int, given: dict[int, Any], function: Any) -> int:
+        """Run one case from its inputs, see `_alone`."""
+        for place, values in given.items():
+            w[place][lane] = values[lane]
+        return self._alone(w, lane, function)
 
     def _alone(self, w: list[Any], lane: int, function: Any) -> int:
         """Run one case in plain floats and put it back."""

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from dataclasses import dataclass, fields
-from functools import cached_property
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field, fields
+from typing import Any
 
 import numpy as np
 
@@ -16,7 +14,7 @@ from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.result_file import TABLES, vector_columns
 from softrobots.core.summary import Part, Summarised, Table, facts, field_facts
-from softrobots.dynamics.motion import Motion, MotionEnergy
+from softrobots.model.soft_model import SoftModel
 
 
 class CompiledEquilibrium(Summarised):
@@ -76,6 +74,18 @@ class CompiledEquilibrium(Summarised):
             return read_only(np.array(self._motors))
         layout = self._layout
         return read_only(np.concatenate([self._part(0, layout.motors), self._part(layout.actuators, layout.muscles)]))
+
+    @property
+    def model(self) -> SoftModel:
+        """The robot."""
+        return self._actuation.model
+
+    @property
+    def friction_bending(self) -> FloatArray | None:
+        """Bending that dry friction remembers, of the sliders of its sections, shape (n_sections, 2) [rad]; None without it."""
+        if not self._layout.rubbing:
+            return None
+        return read_only(self._actuation.bending(self._part(self._layout.slid, self._layout.unknowns)[None])[0])
 
     @property
     def force(self) -> FloatArray:
@@ -162,7 +172,8 @@ class Batch(CaseResults):
     def summary_parts(self) -> list[Part]:
         """Return how many cases have which status, and the ranges of their numbers."""
         counts = [(f"cases {status.name.lower().replace('_', ' ')}", str(number)) for status, number in self.counts().items()]
-        return [facts([*counts, *field_facts(self, *(one.name for one in fields(self) if one.name != "status"))])]
+        shown = [one.name for one in fields(self) if one.name != "status" and getattr(self, one.name) is not None]
+        return [facts([*counts, *field_facts(self, *shown)])]
 
     def counts(self) -> dict[Status, int]:
         """Return the number of cases by status, without statuses that did not occur."""
@@ -176,6 +187,8 @@ class EquilibriumBatch(Batch):
 
     tip_positions: FloatArray
     """The loaded tip, shape (n, 3) [m], world axes."""
+    friction_bending: FloatArray | None = field(default=None, kw_only=True)
+    """Bending that dry friction remembers, of the sliders of its sections, shape (n, n_sections, 2) [rad]; None without it."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -200,48 +213,6 @@ class MotorBatch(Batch):
     """Distance of the loaded tip from its target, shape (n,) [m]."""
     orientation_error: FloatArray | None = None
     """Angle between the loaded tip and its target orientation, shape (n,) [rad]; None for positions."""
-
-
-@dataclass(frozen=True, eq=False, init=False, repr=False)
-class CompiledMotion(Motion):
-    """A `Motion` whose torques and energies are computed when they are asked for, from all steps of the same motion again."""
-
-    def __init__(self, replay: Callable[[FloatArray, FloatArray], Motion], **known: Any) -> None:
-        """Take the other fields of a `Motion`, and a function of its steps and rows that returns it with all of them."""
-        vars(self).update(
-            {name: read_only(value) if isinstance(value, np.ndarray) else value for name, value in known.items()},
-            _replay=replay,
-        )
-
-    @cached_property
-    def _whole(self) -> Motion:
-        replay: Callable[[FloatArray, FloatArray], Motion] = vars(self)["_replay"]
-        return replay(self.steps, self.time)
-
-    @cached_property  # type: ignore[misc]
-    def motor_torques(self) -> FloatArray:
-        """Load that each motor carries, with that of the accelerated masses, shape (n, n_motors) [N m or N]."""
-        return self._whole.motor_torques
-
-    @cached_property  # type: ignore[misc]
-    def energy(self) -> MotionEnergy:
-        """Energies and their balance."""
-        return self._whole.energy
-
-    def __reduce__(self) -> tuple[Any, ...]:
-        """Pickle as a `Motion`."""
-        return Motion, tuple(getattr(self, field.name) for field in fields(Motion))
-
-
-class StepEnd(NamedTuple):
-    """State at the end of a step of time."""
-
-    q_springs: FloatArray
-    """Elastic coordinates, shape (n_springs,) [rad or m]."""
-    velocities: FloatArray
-    """Their rates, shape (n_springs,) [rad/s or m/s]."""
-    tip_position: FloatArray
-    """The tip, shape (3,) [m], world axes."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
