@@ -1,7 +1,7 @@
 """What a bad fit smells of: wrong units or frames, swapped or mirrored axes, shifted rows, commands of wrong sign or order.
 
 Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them. But
-where the rotation of the base is fitted, it hides most of a swapped axis, and other parameters hide commands of wrong sign. Then
+where the rotation of the base is fitted, it hides most of a swapped axis, and other parameters hide reversed commands. Then
 slopes by commands are compared with those of the robot as it was given, and the whole fit is done again to the numbers with two
 axes swapped, or one mirrored, and told by a chi-square test.
 """
