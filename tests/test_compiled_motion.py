@@ -5,6 +5,9 @@ from __future__ import annotations
 import dataclasses
 import functools
 import pickle
+import signal
+import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -307,6 +310,32 @@ def test_an_interrupted_motion_has_what_there_is(solver: CompiledModel, monkeypa
     assert motion.interrupted
     assert motion.time[-1] == pytest.approx(0.06)
     np.testing.assert_array_equal(motion.q_springs, whole.q_springs[: len(motion.time)])
+
+
+def test_an_interrupted_batch_has_the_cases_that_are_done(solver: CompiledModel, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Ctrl-C in the third of ten parts of the second sixteen of 48 cases; what runs meanwhile is slow."""
+    given: dict[str, Any] = {"time_step": 1e-3, "gravity": GRAVITY, "output_step": 1e-2}
+    motors = np.random.default_rng(1).uniform(-0.5, 0.5, (48, 3))
+    whole, forces, calls = solver.simulations(0.1, motors, **given), MotionCases.forces, []
+
+    def pressed(cases: MotionCases, grid: np.ndarray, rows: slice) -> np.ndarray:
+        calls.append(rows.start)
+        if len(calls) == 13:
+            signal.pthread_kill(threading.main_thread().ident or 0, signal.SIGINT)
+        time.sleep(0.1 * (len(calls) >= 13))
+        return forces(cases, grid, rows)
+
+    monkeypatch.setattr(motion_runs, "_CHUNK", 10)
+    monkeypatch.setattr(motion_runs, "_CASE_STEPS", 16 * 101)
+    monkeypatch.setattr(MotionCases, "forces", pressed)
+    batch = solver.simulations(0.1, motors, **given)
+    assert batch.interrupted
+    assert not whole.interrupted
+    np.testing.assert_array_equal(batch.status, np.repeat([Status.CERTIFIED, Status.UNSETTLED, Status.UNSETTLED], 16))
+    np.testing.assert_allclose(
+        batch.tip_position[:16], whole.tip_position[:16], rtol=0, atol=1e-9
+    )  # parts begin without a past
+    assert np.all(np.isfinite(batch.tip_position))
 
 
 def test_long_batches_are_done_in_parts(solver: CompiledModel, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -257,7 +257,8 @@ class CompiledDynamics(CompiledStatics):
         found = taken.rows[:, np.searchsorted(times, rows)]
         fail(taken.status, cases.bad, [], [found])
         tips, asked = np.ascontiguousarray(found[..., -3:]), None if h is not None else largest
-        batch = MotionBatch(rows, *self._elastic_state(found[..., :-3]), tips, taken.status, taken.grid, taken.errors, asked)
+        springs, rates = self._elastic_state(found[..., :-3])
+        batch = MotionBatch(rows, springs, rates, tips, taken.status, taken.grid, taken.errors, asked, taken.interrupted)
         if not taken.is_within:
             raise NotConverged(
                 f"the tips are not known to {largest:.3g} m after a run with {len(taken.grid) - 1} steps; a shorter duration "

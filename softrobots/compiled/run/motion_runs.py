@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
+import threading
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -129,11 +130,11 @@ def take_batch(
     """Take the steps of a grid with many cases; `given` has positions, velocities and what is the same for all cases."""
     n = run.layout.unknowns
     out = np.full((cases.count, len(times), 2 * n + 3), np.nan)
-    statuses = np.zeros(cases.count, dtype=np.uint8)
+    statuses = np.full(cases.count, Status.UNSETTLED, dtype=np.uint8)  # until a case is at its end
     places = tuple(place for place, _ in given)
     most = min(4096, (_CASE_STEPS if cases.stand_still else _SAMPLES // 2) // len(grid))
     size = 16 * max(math.ceil(min(most, cases.count / threads) / 16), 1)
-    stops = sorted(_stops(grid, cases.kicks))
+    stops, stopped = sorted({*_stops(grid, cases.kicks), *range(0, len(grid) - 1, _CHUNK)}), threading.Event()
 
     def solve(case: int) -> None:
         rows = slice(case, min(case + size, cases.count))
@@ -141,20 +142,27 @@ def take_batch(
             np.array(values[rows] if len(values) > 1 else values, order="C") for _, values in given
         ]  # all of one type for numba
         count = rows.stop - case
+        worst = np.zeros(count, dtype=np.uint8)
         for first, end in itertools.pairwise(stops):
+            if stopped.is_set():
+                return
             part, within = grid[first : end + 1], _times_within(times, grid, first, end)
             seen = np.append(times[within], grid[end])
             found, status = np.full((count, len(seen), 2 * n + 3), np.nan), np.zeros(count, dtype=np.uint8)
             driven = cases.motors(part, rows), cases.forces(part, rows), part, seen
             run.motion_batch(tuple(own), places, *driven, found, status, 0, count)
             out[rows, within] = found[:, :-1]
-            statuses[rows] = np.maximum(statuses[rows], status)
+            worst = np.maximum(worst, status)
             own[:2] = [found[:, -1, :n].copy(), found[:, -1, n : 2 * n].copy()]
             cases.kick(spring_kicks, float(grid[end]), rows, own[0], own[1])
+        statuses[rows] = worst
 
     with ThreadPoolExecutor(threads) as pool:
-        list(pool.map(solve, range(0, cases.count, size)))
-    return StepsTaken(grid, out, statuses)
+        try:
+            list(pool.map(solve, range(0, cases.count, size)))
+        except KeyboardInterrupt:
+            stopped.set()
+    return StepsTaken(grid, out, statuses, stopped.is_set())
 
 
 def _stops(grid: FloatArray, kicks: FloatArray) -> set[int]:

@@ -236,6 +236,8 @@ class MotionBatch(CaseResults):
     where it is not measured."""
     tolerance: float | None = None
     """Largest `tip_error` that was asked for [m]; None for fixed steps."""
+    interrupted: bool = False
+    """Whether Ctrl-C ended the run: cases that were not at their end are `Status.UNSETTLED`, with zeros for what is missing."""
 
 
 _AXES = {"tip_positions": ("tip", "m"), "tip_position": ("tip", "m"), "forces": ("force", "N")}
