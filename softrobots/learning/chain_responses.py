@@ -21,6 +21,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.identification.derivatives.actuator_derivatives import ActuatorStates
 from softrobots.identification.derivatives.rows_and_states import States
 from softrobots.identification.model_change import numbers_of
+from softrobots.identification.residual_rates import ResidualRates
 
 
 class ChainEquilibria(NamedTuple):
@@ -90,12 +91,12 @@ class ChainResponses:
             strains[:, self._strains] = self._actuation.of_elastic(motors, elastic)
         return ChainEquilibria(motors, force, elastic, strains, gravity)
 
-    def states(self, at: ChainEquilibria, pulled: Pulled, rows: slice) -> States:
-        """Return some of the cases for the derivatives by parameters."""
+    def states(self, at: ChainEquilibria, tensions: FloatArray, rows: slice) -> States:
+        """Return some of the cases, with the loads on their actuators along the body, for the derivatives by parameters."""
         loads = {self._model.tip: np.concatenate([at.force[rows], np.zeros_like(at.force[rows])], axis=1)}
         if self._weight:
             loads[""] = np.tile(at.gravity, (len(at.force[rows]), 1))
-        torques = np.pad(pulled.tensions[rows], ((0, 0), (self._chain.n_motors, 0)))
+        torques = np.pad(tensions[rows], ((0, 0), (self._chain.n_motors, 0)))
         nothing = np.zeros(0)
         return States(at.motors[rows], at.elastic[rows], loads, torques, nothing, nothing, at.strains[rows])
 
@@ -111,18 +112,40 @@ class ChainResponses:
             along, tensions = -actuators.arms(found.strains[:, None])[:, 0] * actuators.by_input, actuators.pulls
         return Pulled(np.concatenate([found.motors, along], axis=1), found.tip, found.strains, tensions)
 
-    def push(self, at: ChainEquilibria, motors: FloatArray, force: FloatArray, threads: int) -> list[FloatArray]:
-        """Return rates of elastic coordinates and tips from those of actuators, shape (N, n_motors), and force, (N, 3)."""
+    def tensions(self, at: ChainEquilibria, threads: int) -> FloatArray:
+        """Return the loads on the actuators along the body in balance, shape (N, n_muscles), of given lengths; else zeros."""
+        if not self._unknowns.n_constraints:
+            return np.zeros((len(at.motors), len(self._chain.actuators)))
+        still = np.zeros((1, len(self._chain.stiffness)))
+        return self._actuation.held(at.motors, self._respond(at, still, np.zeros((1, 3)), None, None, threads).held)
+
+    def push(
+        self,
+        at: ChainEquilibria,
+        motors: FloatArray,
+        force: FloatArray,
+        threads: int,
+        moved: ResidualRates | None = None,
+    ) -> list[FloatArray]:
+        """Return rates of elastic coordinates and tips.
+
+        Args:
+            at: The equilibria.
+            motors: Rates of the actuators, shape (N, n_motors).
+            force: Rates of the force, shape (N, 3).
+            threads: Number of threads.
+            moved: What parameters change at fixed strains.
+        """
         joints, along = motors[:, : self._chain.n_motors], motors[:, self._chain.n_motors :]
         loads, sums = np.zeros((1, len(self._chain.stiffness))), None
         if self._unknowns.n_constraints:
-            sums = along @ self._slope.T
+            sums = (along if moved is None else along - moved.lengths) @ self._slope.T
         elif len(self._chain.actuators):
             actuators = self._actuators(at)
             tensions, still = (along * actuators.by_input)[:, None], np.zeros((len(at.motors), 1, len(self._chain.stiffness)))
             loads = -actuators.slopes(tensions, np.zeros_like(tensions), still)[0][:, 0]
-        found = self._respond(at, loads, force, joints, sums, threads)
-        return [found.strains @ self._chain.elastic.T, found.tip]
+        found = self._respond(at, loads if moved is None else loads + moved.strains, force, joints, sums, threads)
+        return [found.strains @ self._chain.elastic.T, found.tip if moved is None else found.tip + moved.point]
 
     def _actuators(self, at: ChainEquilibria) -> ActuatorStates:
         """Return the actuators along the body, without their tensions, which derivatives by their inputs do not need."""

@@ -29,6 +29,7 @@ from softrobots.identification.derivatives.rows_and_states import Outputs, State
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
+from softrobots.identification.residual_rates import ResidualRates, residual_rates
 from softrobots.learning.chain_responses import ChainResponses
 from softrobots.learning.row_solver import RowSolver
 from softrobots.model.soft_model import SoftModel
@@ -147,7 +148,7 @@ class GeneralResponses(RowSolver):
         sums = np.zeros(self._change.n_parameters)
         for rows in self._parts(len(weights[0]), 1) if self._change.by_number else ():
             known = pulled.motors[rows, None], pulled.strains[rows, None]
-            at = EquilibriumDerivatives(self._model, chain.states(solved, pulled, rows))
+            at = EquilibriumDerivatives(self._model, chain.states(solved, pulled.tensions, rows))
             springs = weights[0][rows, None]
             adjoint = AdjointRows(at, self._results(springs, weights[1][rows, None]), known)
             sums += (adjoint.by_numbers(self._change) + self._by_coordinates(at, springs)).sum(axis=(0, 1))
@@ -164,26 +165,63 @@ class GeneralResponses(RowSolver):
         count: int,
     ) -> list[FloatArray]:
         """Return rates of the results from those of motors, load and parameters; see `Responses.push`."""
-        n = self._model.n_springs
-        if kind == "equilibrium" and self._chain is not None and not np.any(rates[2]):
-            solved = self._chain.at(cases, gravity, count)
-            of_motors, of_force = (np.broadcast_to(one, (count, one.shape[1])) for one in rates[:2])
-            return self._chain.push(solved, of_motors, of_force, threads)
-        rows_of_results = np.eye(n + 3)
-        moved = np.zeros((count, n + 6 if kind == "estimate" else n + 3))
-        for rows, at in self._chunks(cases, gravity, count, n + 3):
-            motors, load, parameters = (np.broadcast_to(one, (count, one.shape[1]))[rows, :, None] for one in rates)
-            some = np.broadcast_to(rows_of_results, (len(motors), n + 3, n + 3))
-            found = self._of_results(at, some[..., :n], some[..., n:])
-            force = load
+        if kind == "equilibrium" and self._chain is not None:
+            return self._push_compiled(self._chain, cases, gravity, rates, threads, count)
+        moved: list[list[FloatArray]] = []
+        for rows, at in self._chunks(cases, gravity, count, 1):
+            motors, load, parameters = (one if len(one) == 1 else one[rows] for one in rates)
             if kind == "estimate":
                 felt = self._felt(at)
-                left = load[:, self._model.actuators.feels] - felt.by_motors @ motors - felt.by_parameters @ parameters
-                force = np.asarray(np.linalg.solve(felt.by_force, left), dtype=np.float64)
-                moved[rows, n + 3 :] = force[..., 0]
-            whole = found.by_motors @ motors + found.by_force @ force + found.by_parameters @ parameters
-            moved[rows, : n + 3] = whole[..., 0]
-        return np.split(moved, range(n, moved.shape[1], 3)[: 1 if kind == "equilibrium" else 2], axis=1)
+                known = (felt.by_motors @ motors[..., None] + felt.by_parameters @ parameters[..., None])[..., 0]
+                load = np.linalg.solve(felt.by_force, (load[:, self._model.actuators.feels] - known)[..., None])[..., 0]
+            found = self._equilibrium_rates(at, motors, load, parameters)
+            moved.append([*found, load] if kind == "estimate" else found)
+        return [np.concatenate(parts) for parts in zip(*moved, strict=True)]
+
+    def _push_compiled(
+        self, chain: ChainResponses, cases: Cases, gravity: FloatArray, rates: Sequence[FloatArray], threads: int, count: int
+    ) -> list[FloatArray]:
+        """Push by compiled code, with what the parameters change at fixed strains as its right-hand side."""
+        solved = chain.at(cases, gravity, count)
+        of_motors, of_force = (np.broadcast_to(one, (count, one.shape[1])) for one in rates[:2])
+        if not (np.any(rates[2]) and self._change.by_number):
+            return chain.push(solved, of_motors, of_force, threads)
+        held, parts = chain.tensions(solved, threads), []
+        for rows in self._parts(count, 1):
+            at = EquilibriumDerivatives(self._model, chain.states(solved, held, rows))
+            of_parameters = rates[2] if len(rates[2]) == 1 else rates[2][rows]
+            parts.append(residual_rates(at, self._change, of_parameters, self._model.tip))
+        moved = ResidualRates(*(np.concatenate(part) for part in zip(*parts, strict=True)))
+        springs, tips = chain.push(solved, of_motors, of_force, threads, moved)
+        return [springs + self._moved_coordinates(solved.strains, rates[2]), tips]
+
+    def _equilibrium_rates(
+        self, at: EquilibriumDerivatives, motors: FloatArray, force: FloatArray, parameters: FloatArray
+    ) -> list[FloatArray]:
+        """Rates of elastic coordinates and tip, one row a case or one for all."""
+        model, tree = self._model, at.tree
+        moved = residual_rates(at, self._change, parameters, model.tip)
+        loads = tree.load_rates({model.tip: force}, None, None)[:, None]
+        strains = moved.strains + at.on_strains(loads)[1][:, 0]
+        inputs = np.tile(motors, (len(strains) // len(motors), 1))
+        if at.slopes is None:
+            springs = strains = _times(at.compliance, strains + _times(at.states.coupling, inputs))
+        else:
+            by_lengths, by_free = at.slopes
+            inputs[:, at.n_joint_motors :] -= moved.lengths
+            free = _times(np.swapaxes(by_free, 1, 2), strains) + _times(at.states.coupling, inputs)
+            strains = _times(by_lengths, inputs[:, at.n_joint_motors :]) + _times(by_free, _times(at.compliance, free))
+            springs = strains @ self._model.structure.muscle_lengths.elastic.T + self._moved_coordinates(at.strains, parameters)
+        twists = tree.motion(at.joint_rates(inputs[:, None, : at.n_joint_motors], strains[:, None])[:, 0], None)
+        return [springs, tree.point_speed(model.tip, twists, None) + moved.point]
+
+    def _moved_coordinates(self, strains: FloatArray, parameters: FloatArray) -> FloatArray | float:
+        """Rates of the elastic coordinates at strains, shape (N, n_springs), through what they mean."""
+        if "held_elastic" not in self._change.by_number:
+            return 0.0
+        self._check_coordinates()
+        slopes = parameters @ self._change.by_number["held_elastic"].T
+        return _times(slopes.reshape(len(parameters), -1, strains.shape[1]), strains)
 
     def _of_results(self, at: EquilibriumDerivatives, springs: FloatArray, tips: FloatArray) -> _Slopes:
         """Derivatives of weighted elastic coordinates and tips, shapes (N, L, ...)."""
@@ -248,3 +286,8 @@ class GeneralResponses(RowSolver):
         step = max(1, _SIZE // (6 * outputs * max(1, self._model.pinocchio.nv)))
         for first in range(0, count, step):
             yield slice(first, min(first + step, count))
+
+
+def _times(matrices: FloatArray, vectors: FloatArray) -> FloatArray:
+    """Products of matrices and vectors, one a row."""
+    return np.asarray((matrices @ vectors[..., None])[..., 0])
