@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.compiled.run.responses import Cases
 from softrobots.learning.chain_responses import ChainResponses
 from softrobots.learning.differentiable import Differentiable
 from tests.support.learning_cases import CASES, OPTIONS, changes
@@ -61,7 +60,7 @@ def test_compiled_rates_are_differences(name: str) -> None:
 
     responses = ChainResponses(compiled, weight=True)
     springs = solved(0.0)[None, :-3]
-    at = responses.at(Cases(q[None], force[None], np.zeros((1, 0)), springs), np.array(sr.EARTH_GRAVITY), 1)
+    at = responses.at(q[None], force[None], springs, np.array(sr.EARTH_GRAVITY))
     pushed = np.concatenate(responses.push(at, rates[None], push[None], 1), axis=1)[0]
     step = 1e-2  # differences of fourth order; results are in balance to 1e-12 of the load
     slope = np.array([1.0, -8.0, 8.0, -1.0]) @ [solved(n * step) for n in (-2, -1, 1, 2)] / (12.0 * step)

@@ -79,9 +79,9 @@ class Differentiable:
             compiled = robot if isinstance(robot, CompiledModel) and backend != GENERAL else None
             self._changes = GeneralSolver(self._set, weight=gravity is not None, compiled=compiled)
             felt = int(self.model.actuators.feels.sum())
-            if kind == "estimate" and felt != 3:
-                requirement = f"a robot of which three actuators feel the load ({felt} do), or a chain that is compiled"
-                raise ParameterError("robot", self.model.pinocchio.name, f"{requirement}, for derivatives of load estimates")
+            if kind == "estimate" and felt < 3:
+                requirement = f"a robot of which three actuators at least feel the load ({felt} do)"
+                raise ParameterError("robot", self.model.pinocchio.name, requirement)
         self.names, self.present = self._set.names, self._set.values
         m, n = self.model.n_motors, self.model.n_springs
         self.inputs = (m, m if kind == "estimate" else 3, len(self.present))
