@@ -119,6 +119,19 @@ class ChainResponses:
         pulled = self._pulled(at, self._respond(at, loads, np.zeros((1, 3)), joints, sums, threads))
         return pulled._replace(motors=pulled.motors + np.pad(direct, ((0, 0), (chain.n_motors, 0))))
 
+    def feel(self, at: ChainEquilibria, threads: int) -> tuple[FloatArray, FloatArray]:
+        """Return the loads on the actuators, shape (N, n_motors), and their derivatives by the force, (N, n_motors, 3)."""
+        chain, columns = self._chain, []
+        for direction in np.eye(3):
+            found = self._respond(at, np.zeros((1, len(chain.stiffness))), direction[None], None, None, threads)
+            pulled = self._pulled(at, found)
+            if len(chain.actuators) and not self._unknowns.n_constraints:  # a tension by law is not conjugate to its input
+                actuators = self._actuators(at)
+                along = actuators.arms(found.strains[:, None])[:, 0] * actuators.by_length
+                pulled.motors[:, chain.n_motors :] = along
+            columns.append(pulled.motors)
+        return np.concatenate([pulled.torques, pulled.tensions], axis=1), np.stack(columns, axis=2)
+
     def _pulled(self, at: ChainEquilibria, found: _Response) -> Pulled:
         along = tensions = np.zeros((len(at.motors), 0))
         if self._unknowns.n_constraints:

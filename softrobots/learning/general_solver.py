@@ -78,8 +78,8 @@ class GeneralResponses(RowSolver):
     def __init__(
         self, robot: ChangingRobot, weight: bool, compiled: CompiledModel | None, chain: ChainResponses | None
     ) -> None:
-        super().__init__(robot.model, weight, compiled)
-        self._robot, self._chain = robot, chain
+        super().__init__(robot.model, weight, compiled, chain)
+        self._robot = robot
 
     def pull(
         self,
