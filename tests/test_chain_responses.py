@@ -104,7 +104,7 @@ RANDOM: dict[str, tuple[Any, tuple[str, ...]]] = {
 
 
 @pytest.mark.study
-@pytest.mark.shortened(14, 700)
+@pytest.mark.shortened(14, 280)
 def test_rates_by_parameters_are_differences_of_solved_robots(cases: int) -> None:
     """Along random changes of actuators, force and all parameters at once; the transposed gradient is the same number."""
     random, step = np.random.default_rng(31), 3e-4  # of differences of fourth order of changes of a fiftieth

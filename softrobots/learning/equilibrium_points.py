@@ -70,10 +70,9 @@ class EquilibriumPoints(ABC):
     def near(self, force: FloatArray, springs: FloatArray) -> EquilibriumPoints:
         """Return the equilibria under other forces."""
 
-    @property
     @abstractmethod
-    def felt(self) -> FloatArray:
-        """Loads on the actuators, shape (N, n_motors)."""
+    def feel(self) -> tuple[FloatArray, FloatArray]:
+        """Return the loads on the actuators, shape (N, n_motors), and their derivatives by the force, (N, n_motors, 3)."""
 
     @abstractmethod
     def results(self, springs: FloatArray, tips: FloatArray) -> Slopes:
@@ -126,10 +125,10 @@ class PinocchioPoints(EquilibriumPoints):
         tangent = np.array([one.tangent for one in states])
         return EquilibriumDerivatives(model, States(self.motors, self.springs, loads, of_actuators, tangent, coupling))
 
-    @property
-    def felt(self) -> FloatArray:
-        """Loads on the actuators."""
-        return self._at.states.actuator_loads
+    def feel(self) -> tuple[FloatArray, FloatArray]:
+        """Return the loads on the actuators, and their derivatives by the force."""
+        each = np.tile(np.eye(self.motors.shape[1]), (len(self.motors), 1, 1))
+        return self._at.states.actuator_loads, self._slopes(Outputs(loads=each), parameters=False).by_force
 
     def results(self, springs: FloatArray, tips: FloatArray) -> Slopes:
         """Differentiate weighted elastic coordinates and tips."""
@@ -189,10 +188,9 @@ class ChainPoints(EquilibriumPoints):
     def _at(self) -> EquilibriumDerivatives:
         return EquilibriumDerivatives(self.robot.model, self._chain.states(self._solved, self._balance))
 
-    @property
-    def felt(self) -> FloatArray:
-        """Loads on the actuators."""
-        return np.concatenate([self._balance.torques, self._balance.tensions], axis=1)
+    def feel(self) -> tuple[FloatArray, FloatArray]:
+        """Return the loads on the actuators, and their derivatives by the force."""
+        return self._chain.feel(self._solved, self._threads)
 
     def results(self, springs: FloatArray, tips: FloatArray) -> Slopes:
         """Differentiate weighted elastic coordinates and tips."""

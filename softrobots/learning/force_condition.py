@@ -32,16 +32,15 @@ class ForceCondition:
             measured: Measured loads on the actuators, shape (N, n_motors).
             parameters: Whether derivatives by the parameters are needed.
         """
-        count, model = len(measured), at.robot.model
-        rows = np.tile(np.eye(model.n_motors)[model.actuators.feels], (count, 1, 1))
-        by_force = at.loads(rows, parameters=False).by_force
+        feels = at.robot.model.actuators.feels
+        loads, by_force = at.feel()
         self._at, self._parameters, self._curved = at, parameters, None
-        self._combined = rows
-        self._slope = by_force
-        if by_force.shape[1] > 3:
-            across = np.swapaxes(by_force, 1, 2)
-            self._combined, self._slope = across @ rows, across @ by_force
-            left = np.where(model.actuators.feels, measured - at.felt, 0.0)
+        self._combined = np.tile(np.eye(len(feels))[feels], (len(loads), 1, 1))
+        self._slope = by_force[:, feels]
+        if feels.sum() > 3:
+            self._combined = np.where(feels, np.swapaxes(by_force, 1, 2), 0.0)
+            self._slope = self._combined @ by_force
+            left = np.where(feels, measured - loads, 0.0)
             if np.any(np.linalg.norm(left, axis=1) > TOLERANCE * np.linalg.norm(measured, axis=1)):
                 self._curved = self._differences(left)
                 self._slope = self._slope - self._curved.by_force
