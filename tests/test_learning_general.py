@@ -113,7 +113,9 @@ def test_least_squares_of_six_tensions_are_differences_of_estimates(kind: str, s
     weights = [random.normal(size=part.shape) for part in results]
     pulled = solver.pull(inputs, results, weights, [(), (), ()])
     back = sum(float((np.asarray(a) * b).sum()) for a, b in zip(pulled, rates, strict=True))
-    assert back == pytest.approx(float(np.concatenate(weights) @ pushed), rel=1e-10)
+    assert back == pytest.approx(
+        float(np.concatenate(weights) @ pushed), rel=1e-9
+    )  # both modes take differences along other forces
 
 
 def test_rows_without_a_result_are_named_or_marked() -> None:

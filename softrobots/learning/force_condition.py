@@ -24,58 +24,51 @@ _STEP = 1e-5  # largest change of an elastic coordinate in a step of a differenc
 class ForceCondition:
     """The condition at N load estimates."""
 
-    def __init__(self, at: EquilibriumPoints, measured: FloatArray, *, parameters: bool) -> None:
-        """Differentiate the condition.
-
-        Args:
-            at: The robot under the forces that were found.
-            measured: Measured loads on the actuators, shape (N, n_motors).
-            parameters: Whether derivatives by the parameters are needed.
-        """
+    def __init__(self, at: EquilibriumPoints, measured: FloatArray) -> None:
+        """Take the robot under the forces that were found, and the measured loads on the actuators, shape (N, n_motors)."""
         feels = at.robot.model.actuators.feels
         loads, by_force = at.feel()
-        self._at, self._parameters, self._curved = at, parameters, None
-        self._combined = np.tile(np.eye(len(feels))[feels], (len(loads), 1, 1))
-        self._slope = by_force[:, feels]
+        self._at, self._left = at, np.where(feels, measured - loads, 0.0)
+        self._combined, self._explained = np.tile(np.eye(len(feels))[feels], (len(loads), 1, 1)), True
         if feels.sum() > 3:
             self._combined = np.where(feels, np.swapaxes(by_force, 1, 2), 0.0)
-            self._slope = self._combined @ by_force
-            left = np.where(feels, measured - loads, 0.0)
-            if np.any(np.linalg.norm(left, axis=1) > TOLERANCE * np.linalg.norm(measured, axis=1)):
-                self._curved = self._differences(left)
-                self._slope = self._slope - self._curved.by_force
-
-    def _differences(self, left: FloatArray) -> Slopes:
-        """Derivatives along each direction of the force of those of loads with given weights, shape (N, n_motors)."""
-        at, found = self._at, []
-        nothing = np.zeros((1, left.shape[1])), np.zeros((1, len(at.robot.values)))
-        for direction in np.eye(3):
-            moved = at.rates(nothing[0], direction[None], nothing[1])[0]
-            size = _STEP / np.maximum(np.abs(moved).max(axis=1, initial=0.0), 1e-300)[:, None]
-            ends = (
-                at.near(at.force + step * direction, at.springs + step * moved).loads(
-                    left[:, None], parameters=self._parameters
-                )
-                for step in (size, -size)
-            )
-            found.append([(ahead - behind) / (2.0 * size[:, None]) for ahead, behind in zip(*ends, strict=True)])
-        return Slopes(*(np.concatenate(parts, axis=1) for parts in zip(*found, strict=True)))
+            sizes = (np.linalg.norm(one, axis=1) for one in (self._left, TOLERANCE * measured))
+            self._explained = bool(np.all(np.less_equal(*sizes)))
+        self._slope = self._combined @ by_force
 
     def push(self, motors: FloatArray, loads: FloatArray, parameters: FloatArray) -> FloatArray:
         """Return the rates of the force, shape (N, 3), from those of actuators, measured loads, parameters, (N or 1, k)."""
-        known = self._at.loads(self._combined, parameters=self._parameters)
-        if self._curved is not None:
-            known = Slopes(*(one - other for one, other in zip(known, self._curved, strict=True)))
+        changes = bool(np.any(parameters))
+        known, slope = self._at.loads(self._combined, parameters=changes), self._slope
+        if not self._explained:
+            each = [self._along(direction[None], parameters=changes) for direction in np.eye(3)]
+            along = Slopes(*(np.concatenate(parts, axis=1) for parts in zip(*each, strict=True)))
+            known, slope = Slopes(*(a - b for a, b in zip(known, along, strict=True))), slope - along.by_force
         missing = self._combined @ loads[..., None] - known.by_motors @ motors[..., None]
-        if self._parameters:
+        if changes:
             missing = missing - known.by_parameters @ parameters[..., None]
-        return np.asarray(np.linalg.solve(self._slope, missing)[..., 0])
+        return np.asarray(np.linalg.solve(slope, missing)[..., 0])
 
     def pull(self, force: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return the weights of actuators, measured loads and parameters, (N, ...), from those of the force, shape (N, 3)."""
-        weights = np.swapaxes(np.linalg.solve(np.swapaxes(self._slope, 1, 2), force[..., None]), 1, 2)
-        explained = weights @ self._combined
-        found = self._at.loads(explained, parameters=self._parameters)
-        if self._curved is not None:
-            found = Slopes(*(one - weights @ other for one, other in zip(found, self._curved, strict=True)))
-        return -found.by_motors[:, 0], explained[:, 0], -found.by_parameters[:, 0]
+        slope = self._slope
+        if not self._explained:
+            each = [self._along(direction[None], parameters=False).by_force for direction in np.eye(3)]
+            slope = slope - np.concatenate(each, axis=1)
+        weights = np.asarray(np.linalg.solve(np.swapaxes(slope, 1, 2), force[..., None]), dtype=np.float64)[..., 0]
+        explained = (weights[:, None] @ self._combined)[:, 0]
+        found = self._at.loads(explained[:, None])
+        if not self._explained:
+            found = Slopes(*(a - b for a, b in zip(found, self._along(weights), strict=True)))
+        return -found.by_motors[:, 0], explained, -found.by_parameters[:, 0]
+
+    def _along(self, direction: FloatArray, *, parameters: bool = True) -> Slopes:
+        """Differentiate the derivatives of what is left, at constant weights, along a direction of the force, (N or 1, 3)."""
+        at, left = self._at, self._left
+        moved = at.rates(np.zeros((1, left.shape[1])), direction, np.zeros((1, len(at.robot.values))))[0]
+        size = _STEP / np.maximum(np.abs(moved).max(axis=1, initial=0.0), 1e-300)[:, None]
+        ahead, behind = (
+            at.near(at.force + step * direction, at.springs + step * moved).loads(left[:, None], parameters=parameters)
+            for step in (size, -size)
+        )
+        return Slopes(*((a - b) / (2.0 * size[:, None]) for a, b in zip(ahead, behind, strict=True)))

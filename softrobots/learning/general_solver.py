@@ -92,7 +92,7 @@ class GeneralResponses(RowSolver):
         count: int,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return weights of motors and load, and of the parameters, summed; see `Responses.pull`."""
-        model, changes = self._robot.model, bool(self._robot.change.by_number)
+        model = self._robot.model
         motors, load = np.zeros((count, model.n_motors)), np.zeros((count, 3 if kind == "equilibrium" else model.n_motors))
         sums = np.zeros(numbers.shape[1])
         for rows, at in self._chunks(cases, gravity, threads, count):
@@ -103,7 +103,7 @@ class GeneralResponses(RowSolver):
             if kind == "equilibrium":
                 load[rows] = force
                 continue
-            condition = ForceCondition(at, np.broadcast_to(cases.torques, load.shape)[rows], parameters=changes)
+            condition = ForceCondition(at, np.broadcast_to(cases.torques, load.shape)[rows])
             of_motors, load[rows], of_parameters = condition.pull(force + of_force[0])
             motors[rows] += of_motors
             sums += of_parameters.sum(axis=0)
@@ -120,14 +120,14 @@ class GeneralResponses(RowSolver):
         count: int,
     ) -> list[FloatArray]:
         """Return rates of the results from those of motors, load and parameters; see `Responses.push`."""
-        changes, found = bool(self._robot.change.by_number) and bool(np.any(rates[2])), list[list[FloatArray]]()
+        found = list[list[FloatArray]]()
         for rows, at in self._chunks(cases, gravity, threads, count):
             motors, load, parameters = (one if len(one) == 1 else one[rows] for one in rates)
             if kind == "equilibrium":
                 found.append(at.rates(motors, load, parameters))
                 continue
             measured = np.broadcast_to(cases.torques, (count, load.shape[1]))[rows]
-            force = ForceCondition(at, measured, parameters=changes).push(motors, load, parameters)
+            force = ForceCondition(at, measured).push(motors, load, parameters)
             found.append([*at.rates(motors, force, parameters), force])
         return [np.concatenate(parts) for parts in zip(*found, strict=True)]
 
