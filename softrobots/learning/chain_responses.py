@@ -92,12 +92,17 @@ class ChainResponses:
             strains[:, self._strains] = self._actuation.of_elastic(motors, elastic)
         return ChainEquilibria(motors, force, elastic, strains, np.zeros(3) if gravity is None else gravity)
 
-    def states(self, at: ChainEquilibria, pulled: Pulled) -> States:
-        """Return the equilibria for the derivatives by parameters."""
+    @property
+    def holds(self) -> bool:
+        """Whether lengths of actuators are given, whose tensions only the balance tells."""
+        return self._unknowns.n_constraints > 0
+
+    def states(self, at: ChainEquilibria, tensions: FloatArray) -> States:
+        """Return the equilibria for the derivatives by parameters, with the tensions of actuators of given length."""
         loads = {self._model.tip: np.pad(at.force, ((0, 0), (0, 3)))}
         if self._weight:
             loads[""] = np.tile(at.gravity, (len(at.force), 1))
-        torques, nothing = np.concatenate([pulled.torques, pulled.tensions], axis=1), np.zeros(0)
+        torques, nothing = np.pad(tensions, ((0, 0), (self._chain.n_motors, 0))), np.zeros(0)
         return States(at.motors, at.elastic, loads, torques, nothing, nothing, at.strains)
 
     def pull(self, at: ChainEquilibria, springs: FloatArray, tips: FloatArray, threads: int) -> Pulled:
@@ -109,7 +114,7 @@ class ChainResponses:
         chain = self._chain
         joints, along = weights[:, : chain.n_motors], weights[:, chain.n_motors :]
         loads, sums, direct = np.zeros((1, len(chain.stiffness))), None, along
-        if self._unknowns.n_constraints:
+        if self.holds:
             sums, direct = along @ self._slope.T, np.zeros_like(along)
         elif len(chain.actuators):
             actuators = self._actuators(at)
@@ -125,7 +130,7 @@ class ChainResponses:
         for direction in np.eye(3):
             found = self._respond(at, np.zeros((1, len(chain.stiffness))), direction[None], None, None, threads)
             pulled = self._pulled(at, found)
-            if len(chain.actuators) and not self._unknowns.n_constraints:  # a tension by law is not conjugate to its input
+            if len(chain.actuators) and not self.holds:  # a tension by law is not conjugate to its input
                 actuators = self._actuators(at)
                 along = actuators.arms(found.strains[:, None])[:, 0] * actuators.by_length
                 pulled.motors[:, chain.n_motors :] = along
@@ -134,7 +139,7 @@ class ChainResponses:
 
     def _pulled(self, at: ChainEquilibria, found: _Response) -> Pulled:
         along = tensions = np.zeros((len(at.motors), 0))
-        if self._unknowns.n_constraints:
+        if self.holds:
             along, tensions = found.sums @ self._slope, self._actuation.held(at.motors, found.held)
         elif len(self._chain.actuators):
             actuators = self._actuators(at)
@@ -161,7 +166,7 @@ class ChainResponses:
         """
         joints, along = motors[:, : self._chain.n_motors], motors[:, self._chain.n_motors :]
         loads, sums = np.zeros((1, len(self._chain.stiffness))), None
-        if self._unknowns.n_constraints:
+        if self.holds:
             sums = (along if moved is None else along - moved.lengths) @ self._slope.T
         elif len(self._chain.actuators):
             actuators = self._actuators(at)

@@ -179,14 +179,16 @@ class ChainPoints(EquilibriumPoints):
         return ChainPoints(self._chain, self._threads, self.robot, self.motors, force, springs)
 
     @cached_property
-    def _balance(self) -> Pulled:
-        """The response to nothing, with the loads in balance."""
+    def _tensions(self) -> FloatArray:
+        """Tensions of actuators of given length in balance, shape (N, n_muscles); of laws the closed forms know them."""
+        if not self._chain.holds:
+            return np.zeros((len(self.motors), len(self.robot.model.muscles)))
         nothing = np.zeros((1, len(self.robot.model.springs.names)))
-        return self._chain.pull(self._solved, nothing, np.zeros((1, 3)), self._threads)
+        return self._chain.pull(self._solved, nothing, np.zeros((1, 3)), self._threads).tensions
 
     @cached_property
     def _at(self) -> EquilibriumDerivatives:
-        return EquilibriumDerivatives(self.robot.model, self._chain.states(self._solved, self._balance))
+        return EquilibriumDerivatives(self.robot.model, self._chain.states(self._solved, self._tensions))
 
     def feel(self) -> tuple[FloatArray, FloatArray]:
         """Return the loads on the actuators, and their derivatives by the force."""
@@ -195,7 +197,7 @@ class ChainPoints(EquilibriumPoints):
     def results(self, springs: FloatArray, tips: FloatArray) -> Slopes:
         """Differentiate weighted elastic coordinates and tips."""
         pulled = self._chain.pull(self._solved, springs, tips, self._threads)
-        vars(self).setdefault("_balance", pulled)
+        vars(self).setdefault("_tensions", pulled.tensions)
         found = self._slopes([pulled], self._weighted(springs, tips))
         return found._replace(by_parameters=found.by_parameters + self._by_coordinates(springs, self._solved.strains))
 
