@@ -47,8 +47,8 @@ def residual_rates(at: EquilibriumDerivatives, change: ModelChange, rates: Float
         frame: Frame whose position is asked for.
     """
     count = len(at.strains)
-    moved = {name: rates @ slope.T for name, slope in change.by_number.items() if np.any(rates @ slope.T)}
-    moved = {name: one.reshape(len(rates), *_shape(at, name)) for name, one in moved.items()}
+    moved = {name: rates @ slope.T for name, slope in change.by_number.items()}
+    moved = {name: one.reshape(len(rates), *_shape(at, name)) for name, one in moved.items() if np.any(one)}
     motors, point = np.zeros((count, at.n_joint_motors)), np.zeros((count, 3))
     strains, lengths = at.springs.rates(moved), np.zeros(at.inputs.shape)
     if moved.keys() & _OF_BODIES:
@@ -56,7 +56,8 @@ def residual_rates(at: EquilibriumDerivatives, change: ModelChange, rates: Float
         joints, bent = _of_sections(at, moved)
         twists = tree.motion(joints, moved.get("placements"))
         on_joints = tree.at_joints(tree.work_slopes(twists, np.zeros_like(twists)))
-        on_joints += tree.load_rates({}, moved.get("masses"), moved.get("frames"))[:, None]
+        if moved.keys() & {"masses", "frames"}:
+            on_joints += tree.load_rates({}, moved.get("masses"), moved.get("frames"))[:, None]
         of_motors, of_strains = at.on_strains(on_joints)
         motors, strains = of_motors[:, 0], strains + of_strains[:, 0] + bent
         point = tree.point_speed(frame, twists, moved.get("frames"))
