@@ -140,6 +140,9 @@ def test_rows_without_a_result_are_named_or_marked() -> None:
     assert np.array_equal(found[2], expected[2])
     assert np.isnan(marking.push([motors, force, marking.present], results, [None, np.ones(3), None])[0][1:]).all()
     nothing = marking.solve(motors[1:], force, marking.present)  # not one of them
+    moved = marking.push([motors[1:], force, marking.present], nothing, [None, np.ones(3), None])
+    assert [one.shape for one in moved] == [one.shape for one in nothing]
+    assert np.isnan(np.concatenate(moved, axis=1)).all()
     weights = [np.ones_like(one) for one in nothing]
     assert np.array_equal(marking.pull([motors[1:], force, marking.present], nothing, weights, [None, None, ()])[2], [0.0])
 

@@ -120,7 +120,8 @@ class GeneralResponses(RowSolver):
         count: int,
     ) -> list[FloatArray]:
         """Return rates of the results from those of motors, load and parameters; see `Responses.push`."""
-        found = list[list[FloatArray]]()
+        n_results = 2 if kind == "equilibrium" else 3
+        found = [[np.zeros((0, size)) for size in (self._robot.model.n_springs, 3, 3)[:n_results]]]
         for rows, at in self._chunks(cases, gravity, threads, count):
             motors, load, parameters = (one if len(one) == 1 else one[rows] for one in rates)
             if kind == "equilibrium":
@@ -136,7 +137,7 @@ class GeneralResponses(RowSolver):
         robot = self._robot._replace(gravity=gravity if self._weight else None)
         given = [np.broadcast_to(one, (count, one.shape[1])) for one in (cases.motors, cases.force, cases.unknown)]
         whole = self._chain is not None and not robot.change.by_number
-        step = count if whole else max(1, _SIZE // (6 * max(1, robot.model.pinocchio.nv)))
+        step = max(1, count) if whole else max(1, _SIZE // (6 * max(1, robot.model.pinocchio.nv)))
         for first in range(0, count, step):
             rows = slice(first, min(first + step, count))
             some = [one[rows] for one in given]
