@@ -148,6 +148,23 @@ def test_rows_of_parameters_are_robots_of_their_own() -> None:
         assert tips[row] == pytest.approx(batch.tip_positions, abs=1e-14)
 
 
+def test_equal_rows_of_parameters_are_one_batch(monkeypatch: pytest.MonkeyPatch) -> None:
+    """As those that are mapped over; each row of parameters has a gradient of its own."""
+    solver = Differentiable("equilibrium", sr.InflatableArm(), "stiffness", gravity=None, **OPTIONS)
+    asked: list[tuple[float, ...]] = []
+    code = solver._changes.code
+    monkeypatch.setattr(solver._changes, "code", lambda values, **more: asked.append(values) or code(values, **more))
+    random = np.random.default_rng(3)
+    motors, force = random.uniform(-1.0, 1.0, (4, 3)), np.array([1.0, 2.0, -3.0])
+    stiffness = np.array([150.0, 200.0, 150.0, 150.0])[:, None]
+    results = solver.solve(motors, force, stiffness)
+    rates = solver.push([motors, force, stiffness], results, [None, None, np.ones((4, 1))])
+    assert sorted(asked) == [(150.0,), (150.0,), (200.0,), (200.0,)]
+    weights = [np.zeros((4, 4)), np.ones((4, 3))]
+    pulled = solver.pull([motors, force, stiffness], results, weights, [None, None, (4,)])[2]
+    assert pulled == pytest.approx(rates[1].sum(axis=1, keepdims=True), rel=1e-11)
+
+
 def test_cases_that_the_passes_do_not_solve_start_at_the_rest_of_their_robot() -> None:
     """An arm with angles of rest that are parameters has the answers of `softrobots.compile` of that robot, under any load."""
     arm = sr.InflatableArm(rest_up=0.2)

@@ -17,7 +17,7 @@ At a knee (the end of a plateau, a tendon that goes slack) they are the derivati
 from __future__ import annotations
 
 import contextlib
-from functools import cached_property, lru_cache
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -26,7 +26,7 @@ from softrobots.constant_curvature.strain_chain import SectionChain
 from softrobots.core.checks import FloatArray
 from softrobots.identification.derivatives.actuator_derivatives import ActuatorStates
 from softrobots.identification.derivatives.contact_derivatives import ContactDerivatives
-from softrobots.identification.derivatives.loaded_tree import LoadedTree
+from softrobots.identification.derivatives.loaded_tree import LoadedTree, section_joints
 from softrobots.identification.derivatives.rows_and_states import Outputs, States
 from softrobots.identification.derivatives.spring_derivatives import SpringStates
 from softrobots.identification.model_change import ModelChange, numbers_of
@@ -36,7 +36,7 @@ from softrobots.model.springs import POSITIVE
 from softrobots.statics.sensitivity import inverse_stiffness
 
 _OF_SECTIONS, _OF_SPRINGS = {"section_lengths", "section_joints"}, {"stiffness", "rest", "moments"}  # of `model_numbers`
-_OF_ACTUATORS = {"path_length", "path_arms", "path_across", "path_turned", "path_rest", "straightened", "laws"}
+OF_ACTUATORS = {"path_length", "path_arms", "path_across", "path_turned", "path_rest", "straightened", "laws"}
 
 
 class EquilibriumDerivatives:
@@ -47,8 +47,8 @@ class EquilibriumDerivatives:
         self.contact = contact
         """The contacts of the only state; None in free space."""
         structure, held = model.structure, model.structure.muscle_lengths
-        self.model, self.states, self.numbers, self._sections = model, states, numbers_of(model), _section_joints(model)
-        self.n_joint_motors, self._n_singles = len(structure.motor_joints), len(structure.spring_joints)
+        self.model, self.states, self.numbers, self.sections = model, states, numbers_of(model), section_joints(model)
+        self.n_joint_motors, self.n_singles = len(structure.motor_joints), len(structure.spring_joints)
         self.inputs = states.q_motors[:, self.n_joint_motors :]
         """Inputs of the actuators along the body, shape (N, n_muscles)."""
         self.is_held = held is not None
@@ -73,7 +73,7 @@ class EquilibriumDerivatives:
     @property
     def valid(self) -> bool:
         """Whether every section is in range; nothing else has a meaning otherwise."""
-        return self._sections is None or self._chain.valid
+        return self.sections is None or self.chain.valid
 
     @cached_property
     def tree(self) -> LoadedTree:
@@ -81,14 +81,15 @@ class EquilibriumDerivatives:
         structure = self.model.structure
         joints = np.zeros((len(self.strains), self.model.pinocchio.nv))
         joints[:, structure.motor_indices] = self.states.q_motors[:, : self.n_joint_motors]
-        joints[:, structure.spring_indices] = self.strains[:, : self._n_singles]
-        if self._sections is not None:
-            joints[:, self._sections] = self._chain.positions - self.numbers["section_joints"]
+        joints[:, structure.spring_indices] = self.strains[:, : self.n_singles]
+        if self.sections is not None:
+            joints[:, self.sections] = self.chain.positions - self.numbers["section_joints"]
         return LoadedTree(self.model, self.numbers, joints, self.states.loads)
 
     @cached_property
-    def _chain(self) -> SectionChain:
-        z = self.strains[:, self._n_singles :].reshape(len(self.strains), -1, 4)
+    def chain(self) -> SectionChain:
+        """The sections of constant strain."""
+        z = self.strains[:, self.n_singles :].reshape(len(self.strains), -1, 4)
         return SectionChain(z, self.numbers["section_lengths"])
 
     @cached_property
@@ -111,10 +112,19 @@ class EquilibriumDerivatives:
         structure = self.model.structure
         rates: FloatArray = np.zeros((*strains.shape[:2], self.model.pinocchio.nv))
         rates[..., structure.motor_indices] = motors
-        rates[..., structure.spring_indices] = strains[..., : self._n_singles]
-        if self._sections is not None:
-            rates[..., self._sections] = (self._chain.first[:, None] @ self._by_section(strains)[..., None])[..., 0]
+        rates[..., structure.spring_indices] = strains[..., : self.n_singles]
+        if self.sections is not None:
+            rates[..., self.sections] = (self.chain.first[:, None] @ self.by_section(strains)[..., None])[..., 0]
         return rates
+
+    def on_strains(self, on_joints: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Loads on motor joints, (N, L, n_joint_motors), and strains, (N, L, n_strains), of those on joints, (N, L, n)."""
+        structure = self.model.structure
+        motors, strains = on_joints[..., structure.motor_indices], on_joints[..., structure.spring_indices]
+        if self.sections is None:
+            return motors, strains
+        by_section = (on_joints[..., self.sections][..., None, :] @ self.chain.first[:, None])[..., 0, :]
+        return motors, np.concatenate([strains, by_section.reshape(*strains.shape[:2], 4 * len(self.sections))], axis=-1)
 
     def by_coordinates(self, by_twist: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Derivatives of rows that twists change by motor joints and strains, shapes (N, L, n_joint_motors), (N, L, n_strains).
@@ -123,28 +133,27 @@ class EquilibriumDerivatives:
             by_twist: Derivatives by the twist of what is from each joint on, shape (N, n_joints, L, 6).
             rates: The rates of the strains in which loads work, shape (N, L, n_strains): the map turns with the strains.
         """
-        structure, at_joints = self.model.structure, self.tree.at_joints(by_twist)
-        motors, strains = at_joints[..., structure.motor_indices], at_joints[..., structure.spring_indices]
-        if self._sections is None:
-            return motors, strains
-        bending = self._chain.curvature(self.tree.torque[:, self._sections])
-        by_section = (at_joints[..., self._sections][..., None, :] @ self._chain.first[:, None])[..., 0, :]
-        by_section += (bending[:, None] @ self._by_section(rates)[..., None])[..., 0]
-        return motors, np.concatenate([strains, by_section.reshape(*strains.shape[:2], 4 * len(self._sections))], axis=-1)
+        motors, strains = self.on_strains(self.tree.at_joints(by_twist))
+        if self.sections is not None:
+            bending = self.chain.curvature(self.tree.torque[:, self.sections])
+            turned = (bending[:, None] @ self.by_section(rates)[..., None])[..., 0]
+            strains[..., self.n_singles :] += turned.reshape(*strains.shape[:2], 4 * len(self.sections))
+        return motors, strains
 
     def by_sections(self, by_twist: FloatArray, rates: FloatArray) -> dict[str, FloatArray]:
         """The same by what the map of the sections depends on, by the names of `model_numbers`.
 
         Of the joints of a section only the chord `c` depends on its length `l`, in proportion.
         """
-        at_sections = self.tree.at_joints(by_twist)[..., self._sections]
-        chord, torque = self._chain.first[:, None, :, 2], self.tree.torque[:, None, self._sections[:, 2]]
-        lengths = self.numbers["section_lengths"] + self.strains[:, None, self._n_singles + 3 :: 4]
-        turned = (chord[..., :3] * self._by_section(rates)[..., :3]).sum(-1) / lengths
+        at_sections = self.tree.at_joints(by_twist)[..., self.sections]
+        chord, torque = self.chain.first[:, None, :, 2], self.tree.torque[:, None, self.sections[:, 2]]
+        lengths = self.numbers["section_lengths"] + self.strains[:, None, self.n_singles + 3 :: 4]
+        turned = (chord[..., :3] * self.by_section(rates)[..., :3]).sum(-1) / lengths
         return {"section_lengths": at_sections[..., 2] * chord[..., 3] + torque * turned, "section_joints": -at_sections}
 
-    def _by_section(self, strains: FloatArray) -> FloatArray:
-        return strains[..., self._n_singles :].reshape(*strains.shape[:2], len(self._sections), 4)
+    def by_section(self, strains: FloatArray) -> FloatArray:
+        """Strains of sections, shape (N, L, n_sections, 4), of all strains, shape (N, L, n_strains)."""
+        return strains[..., self.n_singles :].reshape(*strains.shape[:2], len(self.sections), 4)
 
 
 class AdjointRows:
@@ -244,7 +253,7 @@ class AdjointRows:
         found, changed = dict[str, FloatArray](), change.by_number.keys()
         if changed & _OF_SECTIONS:
             found = at.by_sections(self._motion[1], self.virtual)
-        if at.actuators is not None and changed & _OF_ACTUATORS:
+        if at.actuators is not None and changed & OF_ACTUATORS:
             found |= self._of_actuators(at.actuators)[1]
         if at.is_held and at.actuators is not None and "held_slopes" in changed:
             found |= self._of_held_directions(at.actuators)
@@ -287,14 +296,3 @@ class AdjointRows:
         felt = self._weights[..., at.n_joint_motors :] - actuators.arms(self.virtual)
         slopes = sums[:, None, :, None] * felt[..., None, :] + (self._lengths @ inverse)[..., None] * missed[:, None, None]
         return {"held_slopes": slopes}
-
-
-@lru_cache(maxsize=64)
-def _section_joints(model: SoftModel) -> Any:
-    """Places of the joints of each section of constant strain in Pinocchio's velocity vector; None without such sections."""
-    if not model.structure.constant_strain:
-        return None
-    rigid = model.pinocchio
-    return np.array(
-        [[rigid.joints[rigid.getJointId(name)].idx_v for name in row.joint_names] for row in model.structure.section_table]
-    )

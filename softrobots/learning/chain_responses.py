@@ -15,12 +15,12 @@ from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import solve_batch
 from softrobots.compiled.run.compiled_model import CompiledModel
-from softrobots.compiled.run.responses import Cases
 from softrobots.compiled.settings import CHUNK
 from softrobots.core.checks import FloatArray
 from softrobots.identification.derivatives.actuator_derivatives import ActuatorStates
 from softrobots.identification.derivatives.rows_and_states import States
 from softrobots.identification.model_change import numbers_of
+from softrobots.identification.residual_rates import ResidualRates
 
 
 class ChainEquilibria(NamedTuple):
@@ -51,6 +51,8 @@ class _Response(NamedTuple):
     """Rates of the loads on the sums that lengths constrain, shape (N, h)."""
     held: FloatArray
     """These loads themselves, beyond those of the start, shape (N, h)."""
+    torques: FloatArray
+    """The loads on motor joints themselves, shape (N, n)."""
 
 
 class Pulled(NamedTuple):
@@ -62,6 +64,8 @@ class Pulled(NamedTuple):
     """Weights of the force, shape (N, 3)."""
     strains: FloatArray
     """Virtual rates of the strains, shape (N, n_strains); see `softrobots.identification.residual_derivatives`."""
+    torques: FloatArray
+    """Loads on the motor joints in balance, shape (N, n_joint_motors)."""
     tensions: FloatArray
     """Loads on the actuators along the body in balance, shape (N, n_muscles)."""
 
@@ -77,52 +81,99 @@ class ChainResponses:
         self._run: Any = make_run(make_given_program(self._unknowns, weight=weight), compiled.backend)
         self._slope = np.eye(self._unknowns.n_constraints) if self._unknowns.held_lengths else self._chain.constrained_slope
 
-    def at(self, cases: Cases, gravity: FloatArray, count: int) -> ChainEquilibria:
-        """Return the cases, N of them."""
-        motors, force, elastic = (
-            np.broadcast_to(one, (count, one.shape[1])) for one in (cases.motors, cases.force, cases.unknown)
-        )
+    def at(self, motors: FloatArray, force: FloatArray, elastic: FloatArray, gravity: FloatArray | None) -> ChainEquilibria:
+        """Return the equilibria at actuators, under forces on the tip, with elastic coordinates, N rows each."""
+        count = len(motors)
         if self._unknowns.held_lengths:
             held: Any = self._model.structure.muscle_lengths
             strains = held.strains_of_many(motors, elastic)
         else:
             strains = np.tile(self._chain.rest, (count, 1))
             strains[:, self._strains] = self._actuation.of_elastic(motors, elastic)
-        return ChainEquilibria(motors, force, elastic, strains, gravity)
+        return ChainEquilibria(motors, force, elastic, strains, np.zeros(3) if gravity is None else gravity)
 
-    def states(self, at: ChainEquilibria, pulled: Pulled, rows: slice) -> States:
-        """Return some of the cases for the derivatives by parameters."""
-        loads = {self._model.tip: np.concatenate([at.force[rows], np.zeros_like(at.force[rows])], axis=1)}
+    @property
+    def holds(self) -> bool:
+        """Whether lengths of actuators are given, whose tensions only the balance tells."""
+        return self._unknowns.n_constraints > 0
+
+    def states(self, at: ChainEquilibria, tensions: FloatArray) -> States:
+        """Return the equilibria for the derivatives by parameters, with the tensions of actuators of given length."""
+        loads = {self._model.tip: np.pad(at.force, ((0, 0), (0, 3)))}
         if self._weight:
-            loads[""] = np.tile(at.gravity, (len(at.force[rows]), 1))
-        torques = np.pad(pulled.tensions[rows], ((0, 0), (self._chain.n_motors, 0)))
-        nothing = np.zeros(0)
-        return States(at.motors[rows], at.elastic[rows], loads, torques, nothing, nothing, at.strains[rows])
+            loads[""] = np.tile(at.gravity, (len(at.force), 1))
+        torques, nothing = np.pad(tensions, ((0, 0), (self._chain.n_motors, 0))), np.zeros(0)
+        return States(at.motors, at.elastic, loads, torques, nothing, nothing, at.strains)
 
     def pull(self, at: ChainEquilibria, springs: FloatArray, tips: FloatArray, threads: int) -> Pulled:
         """Return weights of the inputs from those of elastic coordinates, shape (N, n_springs), and tips, (N, 3)."""
+        return self._pulled(at, self._respond(at, springs @ self._chain.elastic, tips, None, None, threads))
+
+    def pull_loads(self, at: ChainEquilibria, weights: FloatArray, threads: int) -> Pulled:
+        """Return weights of the inputs from those of the loads on the actuators, shape (N, n_motors)."""
         chain = self._chain
-        found = self._respond(at, springs @ chain.elastic, tips, None, None, threads)
-        along = tensions = np.zeros((len(at.motors), 0))
-        if self._unknowns.n_constraints:
-            along, tensions = found.sums @ self._slope, self._actuation.held(at.motors, found.held)
+        joints, along = weights[:, : chain.n_motors], weights[:, chain.n_motors :]
+        loads, sums, direct = np.zeros((1, len(chain.stiffness))), None, along
+        if self.holds:
+            sums, direct = along @ self._slope.T, np.zeros_like(along)
         elif len(chain.actuators):
             actuators = self._actuators(at)
-            along, tensions = -actuators.arms(found.strains[:, None])[:, 0] * actuators.by_input, actuators.pulls
-        return Pulled(np.concatenate([found.motors, along], axis=1), found.tip, found.strains, tensions)
+            still = np.zeros((len(along), 1, len(chain.stiffness)))
+            loads = actuators.slopes(np.zeros_like(along)[:, None], along[:, None], still)[0][:, 0]
+            direct = along * actuators.by_input
+        pulled = self._pulled(at, self._respond(at, loads, np.zeros((1, 3)), joints, sums, threads))
+        return pulled._replace(motors=pulled.motors + np.pad(direct, ((0, 0), (chain.n_motors, 0))))
 
-    def push(self, at: ChainEquilibria, motors: FloatArray, force: FloatArray, threads: int) -> list[FloatArray]:
-        """Return rates of elastic coordinates and tips from those of actuators, shape (N, n_motors), and force, (N, 3)."""
+    def feel(self, at: ChainEquilibria, threads: int) -> tuple[FloatArray, FloatArray]:
+        """Return the loads on the actuators, shape (N, n_motors), and their derivatives by the force, (N, n_motors, 3)."""
+        chain, columns = self._chain, []
+        for direction in np.eye(3):
+            found = self._respond(at, np.zeros((1, len(chain.stiffness))), direction[None], None, None, threads)
+            pulled = self._pulled(at, found)
+            if len(chain.actuators) and not self.holds:  # a tension by law is not conjugate to its input
+                actuators = self._actuators(at)
+                along = actuators.arms(found.strains[:, None])[:, 0] * actuators.by_length
+                pulled.motors[:, chain.n_motors :] = along
+            columns.append(pulled.motors)
+        return np.concatenate([pulled.torques, pulled.tensions], axis=1), np.stack(columns, axis=2)
+
+    def _pulled(self, at: ChainEquilibria, found: _Response) -> Pulled:
+        along = tensions = np.zeros((len(at.motors), 0))
+        if self.holds:
+            along, tensions = found.sums @ self._slope, self._actuation.held(at.motors, found.held)
+        elif len(self._chain.actuators):
+            actuators = self._actuators(at)
+            along, tensions = -actuators.arms(found.strains[:, None])[:, 0] * actuators.by_input, actuators.pulls
+        motors = np.concatenate([found.motors, along], axis=1)
+        return Pulled(motors, found.tip, found.strains, found.torques, tensions)
+
+    def push(
+        self,
+        at: ChainEquilibria,
+        motors: FloatArray,
+        force: FloatArray,
+        threads: int,
+        moved: ResidualRates | None = None,
+    ) -> list[FloatArray]:
+        """Return rates of elastic coordinates and tips.
+
+        Args:
+            at: The equilibria.
+            motors: Rates of the actuators, shape (N, n_motors).
+            force: Rates of the force, shape (N, 3).
+            threads: Number of threads.
+            moved: What parameters change at fixed strains.
+        """
         joints, along = motors[:, : self._chain.n_motors], motors[:, self._chain.n_motors :]
         loads, sums = np.zeros((1, len(self._chain.stiffness))), None
-        if self._unknowns.n_constraints:
-            sums = along @ self._slope.T
+        if self.holds:
+            sums = (along if moved is None else along - moved.lengths) @ self._slope.T
         elif len(self._chain.actuators):
             actuators = self._actuators(at)
             tensions, still = (along * actuators.by_input)[:, None], np.zeros((len(at.motors), 1, len(self._chain.stiffness)))
             loads = -actuators.slopes(tensions, np.zeros_like(tensions), still)[0][:, 0]
-        found = self._respond(at, loads, force, joints, sums, threads)
-        return [found.strains @ self._chain.elastic.T, found.tip]
+        found = self._respond(at, loads if moved is None else loads + moved.strains, force, joints, sums, threads)
+        return [found.strains @ self._chain.elastic.T, found.tip if moved is None else found.tip + moved.point]
 
     def _actuators(self, at: ChainEquilibria) -> ActuatorStates:
         """Return the actuators along the body, without their tensions, which derivatives by their inputs do not need."""
@@ -145,6 +196,7 @@ class ChainResponses:
         inputs += [(place, rates) for place, rates in ((tip.motions, joints), (tip.sums, sums)) if rates is not None]
         results = [(tip.tip_columns, tip.unknowns), (tip.moved, 3), (tip.jacobian, tip.motors)]
         results += [(place, tip.n_constraints) for place in (tip.constraint_columns, layout.held)]
+        results.append((tip.motor_torques, tip.motors))
         nothing = np.zeros((count // CHUNK + 1, 0))
         found, _ = solve_batch(self._run.respond_batch, inputs, results, count, threads, nothing)
         strains = np.zeros((count, len(self._chain.stiffness)))

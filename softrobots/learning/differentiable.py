@@ -79,9 +79,9 @@ class Differentiable:
             compiled = robot if isinstance(robot, CompiledModel) and backend != GENERAL else None
             self._changes = GeneralSolver(self._set, weight=gravity is not None, compiled=compiled)
             felt = int(self.model.actuators.feels.sum())
-            if kind == "estimate" and felt != 3:
-                requirement = f"a robot of which three actuators feel the load ({felt} do), or a chain that is compiled"
-                raise ParameterError("robot", self.model.pinocchio.name, f"{requirement}, for derivatives of load estimates")
+            if kind == "estimate" and felt < 3:
+                requirement = f"a robot of which three actuators at least feel the load ({felt} do)"
+                raise ParameterError("robot", self.model.pinocchio.name, requirement)
         self.names, self.present = self._set.names, self._set.values
         m, n = self.model.n_motors, self.model.n_springs
         self.inputs = (m, m if kind == "estimate" else 3, len(self.present))
@@ -167,7 +167,7 @@ class Differentiable:
         sums = np.zeros(values_of.shape)
         by_group = sums.reshape(math.prod(sums.shape[:-1]), -1)
         found = _Parts(math.prod(lead))
-        for group, (rows, count, values, cases) in enumerate(self._cases([*inputs[:2], values_of], results, lead)):
+        for group, (rows, count, values, cases) in enumerate(self._cases([*inputs[:2], values_of], results, lead, apart=True)):
             code, numbers, slopes = self._changes.code(values, slopes=shapes[2] is not None)
             picked = [_picked(one, rows) for one in given]
             *pulled, of_numbers = code.pull(self.kind, cases, self._gravity, numbers, picked, self._threads, count)
@@ -184,7 +184,7 @@ class Differentiable:
         return motors + offsets if np.any(offsets) else motors
 
     def _cases(
-        self, inputs: Sequence[Any], results: Sequence[Any], lead: tuple[int, ...]
+        self, inputs: Sequence[Any], results: Sequence[Any], lead: tuple[int, ...], *, apart: bool = False
     ) -> Iterator[tuple[Any, int, tuple[float, ...], Cases]]:
         """Yield rows, without those that failed, their number, values of the parameters, and the cases."""
         motors, load = (_flat(one, lead) for one in inputs[:2])
@@ -192,7 +192,7 @@ class Differentiable:
         solved = np.ones(math.prod(lead), dtype=bool)
         if not np.isfinite(springs.sum()):
             solved &= np.all(np.isfinite(springs), axis=1)
-        for rows, values in _groups(inputs[2], lead):
+        for rows, values in _groups(inputs[2], lead, apart=apart):
             if not np.all(solved[rows]):
                 rows = np.arange(len(solved))[rows][solved[rows]]
             torques = _picked(load, rows) if force else np.zeros((1, self.model.n_motors))
@@ -267,14 +267,17 @@ def _picked(array: FloatArray, rows: Any) -> FloatArray:
     return array if len(array) == 1 else array[rows]
 
 
-def _groups(parameters: Any, lead: tuple[int, ...]) -> Iterator[tuple[Any, tuple[float, ...]]]:
-    """Yield the rows of each row of parameters, and its values."""
+def _groups(parameters: Any, lead: tuple[int, ...], *, apart: bool = False) -> Iterator[tuple[Any, tuple[float, ...]]]:
+    """Yield the rows that share values of the parameters, and these; or, `apart`, those of each row of parameters."""
     values = np.asarray(parameters, dtype=np.float64)
     each = values.reshape(math.prod(values.shape[:-1]), values.shape[-1])
+    place = np.arange(len(each))
+    if len(each) > 1 and not apart:
+        each, place = np.unique(each, axis=0, return_inverse=True)
     if len(each) == 1:
         yield slice(None), tuple(each[0].tolist())
         return
-    group = np.broadcast_to(np.arange(len(each)).reshape(values.shape[:-1]), lead).ravel()
+    group = np.broadcast_to(place.reshape(values.shape[:-1]), lead).ravel()
     members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group, minlength=len(each)))[:-1])
     for rows, row in zip(members, each.tolist(), strict=True):
         yield rows, tuple(row)

@@ -1,23 +1,17 @@
 r"""Equilibria and load estimates of every robot without dry friction, with the derivatives of those of `sensitivity`.
 
 The counterpart of `number_changes` and compiled code, with the same calls: each row is found as by `solve_equilibrium` or
-`estimate_load`, from rest; equilibria of the robot that code was compiled of by its batch solver. Derivatives are the closed
-forms of `softrobots.identification.residual_derivatives` for many rows at once: in reverse one adjoint row a case, whatever the
-number of parameters; forwards one for each component of the results.
-The numbers of the robot are here its parameters themselves.
-
-A load estimate holds three felt loads `tau` at what was measured by the force `f`:
-
-.. math:: df = \Bigl(\frac{d\tau}{df}\Bigr)^{-1} \Bigl(d\tau - \frac{d\tau}{dq_m} dq_m - \frac{d\tau}{dp} dp\Bigr)
+`estimate_load`, from rest; those of the robot that code was compiled of by its batch solvers. Derivatives are the closed forms
+of `softrobots.identification.residual_derivatives` and `residual_rates` for many rows at once, one right-hand side a case in
+either mode, whatever the number of parameters and results. The numbers of the robot are here its parameters themselves.
 
 Given lengths leave combinations `y = E z` of the strains `z` free; `E` changes with the parameters, too.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from functools import cached_property, lru_cache
-from typing import NamedTuple
 
 import numpy as np
 
@@ -25,17 +19,15 @@ from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.run.responses import Cases
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
-from softrobots.identification.derivatives.rows_and_states import Outputs, States
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
-from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
 from softrobots.learning.chain_responses import ChainResponses
+from softrobots.learning.equilibrium_points import ChainPoints, ChangingRobot, EquilibriumPoints, PinocchioPoints
+from softrobots.learning.force_condition import ForceCondition
 from softrobots.learning.row_solver import RowSolver
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastic_state import elastic_state
 
 _SIZE = 1 << 20  # numbers of the twists of a chunk of cases
-_JUMPS = 1e4  # change of a coefficient of `E` over the relative change of a parameter, above which it jumps
 
 
 class GeneralSolver:
@@ -55,12 +47,10 @@ class GeneralSolver:
         """
         size = len(values)
         change = self._change(values) if slopes else ModelChange(size, {})
-        sizes = dict(zip(self._parameters.names, values, strict=True))
         model, compiled = self._at(values), self._compiled
+        robot = ChangingRobot(model, change, dict(zip(self._parameters.names, values, strict=True)), None)
         same = compiled is not None and compiled.model == model
-        responses = GeneralResponses(
-            model, change, sizes, self._weight, compiled if same else None, self._chain_responses if same else None
-        )
+        responses = GeneralResponses(robot, self._weight, compiled if same else None, self._chain_responses if same else None)
         return responses, np.array(values).reshape(1, size), np.eye(size) if slopes else np.zeros((size, 0))
 
     @cached_property
@@ -82,28 +72,14 @@ class GeneralSolver:
         return model_change(self._parameters, values)
 
 
-class _Slopes(NamedTuple):
-    """Derivatives of outputs, shapes (N, L, ...)."""
-
-    by_motors: FloatArray
-    by_force: FloatArray
-    by_parameters: FloatArray
-
-
 class GeneralResponses(RowSolver):
     """Solvers of a robot at values of its parameters; see `softrobots.compiled.run.responses.Responses`."""
 
     def __init__(
-        self,
-        model: SoftModel,
-        change: ModelChange,
-        values: Mapping[str, float],
-        weight: bool,
-        compiled: CompiledModel | None,
-        chain: ChainResponses | None,
+        self, robot: ChangingRobot, weight: bool, compiled: CompiledModel | None, chain: ChainResponses | None
     ) -> None:
-        super().__init__(model, weight, compiled)
-        self._change, self._values, self._chain = change, values, chain
+        super().__init__(robot.model, weight, compiled, chain)
+        self._robot = robot
 
     def pull(
         self,
@@ -116,42 +92,22 @@ class GeneralResponses(RowSolver):
         count: int,
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Return weights of motors and load, and of the parameters, summed; see `Responses.pull`."""
-        model = self._model
+        model = self._robot.model
         motors, load = np.zeros((count, model.n_motors)), np.zeros((count, 3 if kind == "equilibrium" else model.n_motors))
-        sums = np.zeros(self._change.n_parameters)
-        weights = [np.broadcast_to(one, (count, one.shape[1])) for one in weights]
-        if kind == "equilibrium" and self._chain is not None:
-            return self._pull_compiled(self._chain, cases, gravity, weights, threads)
-        for rows, at in self._chunks(cases, gravity, count, 1):
-            springs, tips, *forces = (one[rows, None] for one in weights)
-            found = self._of_results(at, springs, tips)
-            if forces:
-                felt = self._felt(at)
-                explained = np.linalg.solve(
-                    np.swapaxes(felt.by_force, 1, 2), np.swapaxes(found.by_force + forces[0], 1, 2)
-                ).swapaxes(1, 2)
-                found = _Slopes(*(one - explained @ other for one, other in zip(found, felt, strict=True)))
-                load[rows, model.actuators.feels] = explained[:, 0]
-            else:
-                load[rows] = found.by_force[:, 0]
-            motors[rows] = found.by_motors[:, 0]
+        sums = np.zeros(numbers.shape[1])
+        for rows, at in self._chunks(cases, gravity, threads, count):
+            springs, tips, *of_force = (one if len(one) == 1 else one[rows] for one in weights)
+            found = at.results(springs, tips)
+            motors[rows], force = found.by_motors[:, 0], found.by_force[:, 0]
             sums += found.by_parameters.sum(axis=(0, 1))
+            if kind == "equilibrium":
+                load[rows] = force
+                continue
+            condition = ForceCondition(at, np.broadcast_to(cases.torques, load.shape)[rows])
+            of_motors, load[rows], of_parameters = condition.pull(force + of_force[0])
+            motors[rows] += of_motors
+            sums += of_parameters.sum(axis=0)
         return motors, load, sums
-
-    def _pull_compiled(
-        self, chain: ChainResponses, cases: Cases, gravity: FloatArray, weights: Sequence[FloatArray], threads: int
-    ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Pull by compiled code, and the parameters by the virtual motion that it finds."""
-        solved = chain.at(cases, gravity, len(weights[0]))
-        pulled = chain.pull(solved, weights[0], weights[1], threads)
-        sums = np.zeros(self._change.n_parameters)
-        for rows in self._parts(len(weights[0]), 1) if self._change.by_number else ():
-            known = pulled.motors[rows, None], pulled.strains[rows, None]
-            at = EquilibriumDerivatives(self._model, chain.states(solved, pulled, rows))
-            springs = weights[0][rows, None]
-            adjoint = AdjointRows(at, self._results(springs, weights[1][rows, None]), known)
-            sums += (adjoint.by_numbers(self._change) + self._by_coordinates(at, springs)).sum(axis=(0, 1))
-        return pulled.motors, pulled.force, sums
 
     def push(
         self,
@@ -164,87 +120,26 @@ class GeneralResponses(RowSolver):
         count: int,
     ) -> list[FloatArray]:
         """Return rates of the results from those of motors, load and parameters; see `Responses.push`."""
-        n = self._model.n_springs
-        if kind == "equilibrium" and self._chain is not None and not np.any(rates[2]):
-            solved = self._chain.at(cases, gravity, count)
-            of_motors, of_force = (np.broadcast_to(one, (count, one.shape[1])) for one in rates[:2])
-            return self._chain.push(solved, of_motors, of_force, threads)
-        rows_of_results = np.eye(n + 3)
-        moved = np.zeros((count, n + 6 if kind == "estimate" else n + 3))
-        for rows, at in self._chunks(cases, gravity, count, n + 3):
-            motors, load, parameters = (np.broadcast_to(one, (count, one.shape[1]))[rows, :, None] for one in rates)
-            some = np.broadcast_to(rows_of_results, (len(motors), n + 3, n + 3))
-            found = self._of_results(at, some[..., :n], some[..., n:])
-            force = load
-            if kind == "estimate":
-                felt = self._felt(at)
-                left = load[:, self._model.actuators.feels] - felt.by_motors @ motors - felt.by_parameters @ parameters
-                force = np.asarray(np.linalg.solve(felt.by_force, left), dtype=np.float64)
-                moved[rows, n + 3 :] = force[..., 0]
-            whole = found.by_motors @ motors + found.by_force @ force + found.by_parameters @ parameters
-            moved[rows, : n + 3] = whole[..., 0]
-        return np.split(moved, range(n, moved.shape[1], 3)[: 1 if kind == "equilibrium" else 2], axis=1)
+        n_results = 2 if kind == "equilibrium" else 3
+        found = [[np.zeros((0, size)) for size in (self._robot.model.n_springs, 3, 3)[:n_results]]]
+        for rows, at in self._chunks(cases, gravity, threads, count):
+            motors, load, parameters = (one if len(one) == 1 else one[rows] for one in rates)
+            if kind == "equilibrium":
+                found.append(at.rates(motors, load, parameters))
+                continue
+            measured = np.broadcast_to(cases.torques, (count, load.shape[1]))[rows]
+            force = ForceCondition(at, measured).push(motors, load, parameters)
+            found.append([*at.rates(motors, force, parameters), force])
+        return [np.concatenate(parts) for parts in zip(*found, strict=True)]
 
-    def _of_results(self, at: EquilibriumDerivatives, springs: FloatArray, tips: FloatArray) -> _Slopes:
-        """Derivatives of weighted elastic coordinates and tips, shapes (N, L, ...)."""
-        found = self._slopes(at, self._results(springs, tips))
-        return found._replace(by_parameters=found.by_parameters + self._by_coordinates(at, springs))
-
-    def _results(self, springs: FloatArray, tips: FloatArray) -> Outputs:
-        """Weighted elastic coordinates and tips as outputs."""
-        held = self._model.structure.muscle_lengths
-        weights: FloatArray = springs if held is None else np.asarray(springs @ held.elastic)
-        return Outputs(frame=self._model.tip, pose=np.concatenate([tips, np.zeros_like(tips)], axis=-1), strains=weights)
-
-    def _by_coordinates(self, at: EquilibriumDerivatives, springs: FloatArray) -> FloatArray | float:
-        """Derivatives of weighted elastic coordinates through what they mean, shape (N, L, P)."""
-        if self._model.structure.muscle_lengths is None or not np.any(springs):
-            return 0.0
-        self._check_coordinates()
-        return self._change.along("held_elastic", springs[..., None] * at.strains[:, None, None])
-
-    def _check_coordinates(self) -> None:
-        """Refuse parameters with which the elastic coordinates of given lengths jump, as those of equal sections may."""
-        slopes = self._change.by_number.get("held_elastic", np.zeros((1, len(self._values))))
-        for (name, value), slope in zip(self._values.items(), np.abs(slopes).max(axis=0), strict=True):
-            if slope * abs(value) > _JUMPS:
-                requirement = "a value about which the elastic coordinates do not jump, or gradients of the tip alone"
-                raise ParameterError(name, value, requirement)
-
-    def _felt(self, at: EquilibriumDerivatives) -> _Slopes:
-        """Derivatives of the loads that actuators feel."""
-        weights = np.eye(self._model.n_motors)[self._model.actuators.feels]
-        return self._slopes(at, Outputs(loads=np.tile(weights, (len(at.strains), 1, 1))))
-
-    def _slopes(self, at: EquilibriumDerivatives, outputs: Outputs) -> _Slopes:
-        rows = AdjointRows(at, outputs)
-        return _Slopes(rows.by_actuators, rows.by_loads()[self._model.tip][..., :3], rows.by_numbers(self._change))
-
-    def _chunks(
-        self, cases: Cases, gravity: FloatArray, count: int, outputs: int
-    ) -> Iterator[tuple[slice, EquilibriumDerivatives]]:
-        """Yield some of the cases after another, and the robot at them."""
-        model = self._model
-        motors, force, springs = (
-            np.broadcast_to(one, (count, one.shape[1])) for one in (cases.motors, cases.force, cases.unknown)
-        )
-        for rows in self._parts(count, outputs):
-            states = [
-                elastic_state(model, at, here, self._load(push, gravity))
-                for at, push, here in zip(motors[rows], force[rows], springs[rows], strict=True)
-            ]
-            loads = {model.tip: np.concatenate([force[rows], np.zeros((len(states), 3))], axis=1)}
-            if self._weight:
-                loads[""] = np.tile(gravity, (len(states), 1))
-            of_actuators, coupling = (np.array([getattr(one.load, name) for one in states]) for name in ("motors", "coupling"))
-            tangent = np.array([one.tangent for one in states])
-            yield (
-                rows,
-                EquilibriumDerivatives(model, States(motors[rows], springs[rows], loads, of_actuators, tangent, coupling)),
-            )
-
-    def _parts(self, count: int, outputs: int) -> Iterator[slice]:
-        """Yield the rows of one chunk of cases after another."""
-        step = max(1, _SIZE // (6 * outputs * max(1, self._model.pinocchio.nv)))
+    def _chunks(self, cases: Cases, gravity: FloatArray, threads: int, count: int) -> Iterator[tuple[slice, EquilibriumPoints]]:
+        """Yield some of the cases after another, and the robot at them; all at once where code alone differentiates."""
+        robot = self._robot._replace(gravity=gravity if self._weight else None)
+        given = [np.broadcast_to(one, (count, one.shape[1])) for one in (cases.motors, cases.force, cases.unknown)]
+        whole = self._chain is not None and not robot.change.by_number
+        step = max(1, count) if whole else max(1, _SIZE // (6 * max(1, robot.model.pinocchio.nv)))
         for first in range(0, count, step):
-            yield slice(first, min(first + step, count))
+            rows = slice(first, min(first + step, count))
+            some = [one[rows] for one in given]
+            points = PinocchioPoints(robot, *some) if self._chain is None else ChainPoints(self._chain, threads, robot, *some)
+            yield rows, points

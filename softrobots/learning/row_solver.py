@@ -11,6 +11,8 @@ from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import LoadNotFound, NeutralEquilibrium, ParameterError
+from softrobots.learning.chain_responses import ChainResponses
+from softrobots.learning.force_batches import ForceBatches
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import TOLERANCE, largest_residual
 from softrobots.statics.elastostatics import solve_springs
@@ -25,9 +27,9 @@ _FINE = 1e-12  # tolerance of equilibria, relative to their load
 class RowSolver:
     """Solvers of a robot, from rest."""
 
-    def __init__(self, model: SoftModel, weight: bool, compiled: CompiledModel | None) -> None:
-        """Take the robot, whether it has weight, and compiled solvers of it for its equilibria."""
-        self._model, self._weight, self._compiled = model, weight, compiled
+    def __init__(self, model: SoftModel, weight: bool, compiled: CompiledModel | None, chain: ChainResponses | None) -> None:
+        """Take the robot, whether it has weight, and its compiled solvers and derivatives, if there are any."""
+        self._model, self._weight, self._compiled, self._chain = model, weight, compiled, chain
 
     def equilibria(
         self, motors: FloatArray, force: FloatArray, gravity: FloatArray, numbers: FloatArray, threads: int, count: int
@@ -59,6 +61,10 @@ class RowSolver:
         self, motors: FloatArray, torques: FloatArray, gravity: FloatArray, numbers: FloatArray, threads: int, count: int
     ) -> list[Any]:
         """Find forces on the tip from the loads on the motors."""
+        if self._compiled is not None and self._chain is not None:
+            rows = [np.broadcast_to(one, (count, one.shape[1])) for one in (motors, torques)]
+            search = ForceBatches(self._compiled, self._chain, gravity if self._weight else None, threads)
+            return list(search.find(*rows))
         springs, tips, errors, statuses = self._room(count)
         forces = np.zeros((count, 3))
         for row, (at, felt) in enumerate(_rows(count, motors, torques)):

@@ -33,8 +33,8 @@ def equilibrium(
         backend: "numba" or "python", as for `softrobots.compile`: short chains of joints, inflatable arms among them, in
             microseconds a case; or "pinocchio": every robot without dry friction, solved from rest as by `solve_equilibrium`,
             in tenths of a millisecond to milliseconds. By default compiled code where it has derivatives. Of what
-            `softrobots.compile` returns, equilibria at the values that it was compiled with are those of its batch solver, and
-            their derivatives are compiled, too; of those by parameters all but forward mode.
+            `softrobots.compile` returns, results at the values that it was compiled with come from its batch solver, and their
+            derivatives are compiled, too.
         threads: Number of threads of compiled code.
         failed: What becomes of rows without a stable equilibrium: "raise" raises an error that names them, "nan" makes their
             results NaN and their gradients zero.
@@ -67,7 +67,7 @@ def load_estimate(
     """Return the force on the tip that explains the loads on the motors as a function of PyTorch.
 
     Args:
-        robot: See `equilibrium`; with three motor joints at least. Without compiled code exactly three actuators feel loads.
+        robot: See `equilibrium`; at least three of its actuators feel loads.
         parameters: See `equilibrium`.
         gravity: See `equilibrium`.
         backend: See `equilibrium`.

@@ -78,12 +78,13 @@ def _start_turn(plan: Plan, tip: TipLayout) -> Block:
 
 def _finish(plan: Plan, tip: TipLayout) -> Block:
     """Add the sums beyond each motor, pass the leading motors, and turn the motion of the tip into world axes."""
-    block = Block("finish_given", "Compute the changes of the loads on motors and the motion of the tip.")
+    block = Block("finish_given", "Compute the loads on motors, their changes, and the motion of the tip.")
     axes = vector(block.loads(plan.recursion.base, 9)).reshape(3, 3)
     force, total = vector(block.loads(tip.base_force, 3)), vector(block.loads(tip.bends, 3))
     moved, jacobian = vector(block.loads(tip.moved, 3)), {}
     for motor, motion in leading_motors(plan, block):
         jacobian[motor] = force @ motion.moves[:, 0] + total @ motion.twists[:, 0]
+        block.store(tip.motor_torques + motor, motion.torque[0])
         moved = moved + motion.moves[:, 0] * block.load(tip.motions + motor)
     for motor in set(range(tip.motors)) - set(jacobian):
         twist = [block.load(tip.twists + axis * tip.motors + motor) for axis in range(3)]

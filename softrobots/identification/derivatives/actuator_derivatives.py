@@ -137,3 +137,46 @@ class ActuatorStates:
         each = by_along[..., None] * paths.arms + by_around[..., None] * paths.across[:, 0]
         each += by_radial[..., None] * paths.across[:, 1]
         return each.reshape(*rates.shape[:2], each.shape[-2] * each.shape[-1]) @ self._to_strains, found
+
+    def rates(self, change: Mapping[str, FloatArray], tensions: FloatArray) -> tuple[FloatArray, FloatArray]:
+        r"""Rates of the lengths, and of the loads :math:`-T\,\partial l/\partial z`, at fixed strains.
+
+        With :math:`u = (A, B)`, affine in the section coordinates by the rows `P`, a length is that of `u`, whose direction `n`
+        gives :math:`\partial l/\partial z = n P`.
+
+        Args:
+            change: Rates of the numbers, shape (N or 1, ...) by the names of `model_numbers`.
+            tensions: Rates of the tensions where lengths are given, shape (N, n_muscles).
+
+        Returns:
+            Shapes (N, n_muscles) [m] and (N, n_strains).
+        """
+
+        def of(name: str, like: FloatArray) -> FloatArray:
+            return change.get(name, np.zeros((1, *like.shape)))
+
+        paths, separable, z, size = self._paths, self._paths.separable, self._z, self._size[..., None]
+        rows = np.concatenate([paths.arms[:, None], paths.across], axis=1)
+        moved = np.concatenate([of("path_arms", paths.arms)[:, :, None], of("path_across", paths.across)], axis=2)
+        length, turned = of("path_length", paths.length), of("path_turned", paths.turned)
+        pointing = np.stack([self._along, self._around, self._radial], axis=-1) / size
+        pointing[..., 0] = self._by_size
+        tangent = (moved @ z[..., None])[..., 0]
+        tangent[..., 0] += length
+        tangent[..., 1] += turned
+        growth = np.where(separable, length, (pointing * tangent).sum(-1))
+        turning = (tangent - pointing * growth[..., None]) / size
+        turning[..., 0] = np.where(separable, 0.0, turning[..., 0])
+        rest, around = paths.turned / paths.length, pointing[..., 1]
+        of_lumped = tangent[..., 0] + around * tangent[..., 1] - rest * turned - 0.5 * (around**2 - rest**2) * length
+        lengths = self._summed(np.where(separable, of_lumped, growth) - length)
+        if self.by_law:
+            tensions = self.by_length * (lengths + of("straightened", paths.straightened))
+            tensions = tensions + (self._by_law * of("laws", self._by_law[0])).sum(-1)
+        else:
+            lengths = lengths + of("path_rest", paths.rest)
+        pulled = tensions[:, paths.muscle, None, None] * pointing[..., None, :] + (
+            self._tensions[:, paths.muscle, None, None] * turning[..., None, :]
+        )
+        loads = pulled @ rows + (self._tensions[:, paths.muscle, None] * pointing)[..., None, :] @ moved
+        return lengths, -loads.reshape(len(z), loads.shape[1] * loads.shape[-1]) @ self._to_strains

@@ -60,6 +60,17 @@ def topology(model: SoftModel) -> Topology:
     return Topology(parents, beyond, axes, (placements @ motions).reshape(n, 4, 16))
 
 
+@lru_cache(maxsize=64)
+def section_joints(model: SoftModel) -> Any:
+    """Places of the joints of each section of constant strain in Pinocchio's velocity vector; None without such sections."""
+    if not model.structure.constant_strain:
+        return None
+    rigid = model.pinocchio
+    return np.array(
+        [[rigid.joints[rigid.getJointId(name)].idx_v for name in row.joint_names] for row in model.structure.section_table]
+    )
+
+
 class _Loaded(NamedTuple):
     """A frame with a wrench."""
 
@@ -143,6 +154,54 @@ class LoadedTree:
         """Twists, at the origin, of the bodies, and of the joints in the bodies before, at rates of shape (N, L, n)."""
         each = np.swapaxes(rates, 1, 2)[..., None] * self.axes[:, :, None]
         return (self.topology.beyond.T @ each.reshape(*each.shape[:2], -1)).reshape(each.shape), each
+
+    def motion(self, joints: FloatArray, placements: FloatArray | None) -> FloatArray:
+        """Twists of the bodies, shape (N, n, 1, 6), at rates of the joints, (N, n), and twists of their placements.
+
+        The latter are in the joints before, shape (N or 1, n, 6); None: they stay.
+        """
+        each = self.axes * joints[..., None]
+        if placements is not None:
+            moved = np.flatnonzero(np.any(placements, axis=(0, 2)))
+            parents, twists = self.topology.parents[moved], placements[:, moved]
+            linear, about = self._turned(parents, twists[..., :3]), self._turned(parents, twists[..., 3:])
+            each[:, moved] += np.concatenate([linear + cross(self.position[:, parents], about), about], axis=-1)
+        return np.asarray(self.topology.beyond.T @ each)[:, :, None]
+
+    def point_speed(self, name: str, twists: FloatArray | None, frames: FloatArray | None) -> FloatArray:
+        """Velocity of a frame, shape (N, 3), at twists of bodies, see `motion`, and of frames in them, (N or 1, k, 6)."""
+        body, local, point = self.frame(name)
+        speed: FloatArray = np.zeros(point.shape)
+        if twists is not None and body >= 0:
+            speed += twists[:, body, 0, :3] + cross(twists[:, body, 0, 3:], point)
+        if frames is not None:
+            moving = frames[:, self._model.frame_id(name)]
+            speed += self._turned(body, moving[:, :3] + cross(moving[:, 3:], np.broadcast_to(local, (len(moving), 3))))
+        return speed
+
+    def load_rates(self, forces: Mapping[str, FloatArray], masses: FloatArray | None, frames: FloatArray | None) -> FloatArray:
+        """Rates of `torque`, shape (N, n), while the joints stand still; None of what stays.
+
+        Args:
+            forces: Rates of the forces on frames, shape (N or 1, 3) [N].
+            masses: Rates of mass and first moment of each body, shape (N or 1, n, 4).
+            frames: Twists of the frames in their joints, shape (N or 1, k, 6).
+        """
+        wrenches: FloatArray = np.zeros(self.axes.shape)
+        if masses is not None and self._gravity is not None:
+            first = self._turned(slice(-1), masses[..., 1:]) + masses[..., :1] * self._origins
+            wrenches[..., :3], wrenches[..., 3:] = masses[..., :1] * self._gravity, cross(first, self._gravity)
+        for one in self._loaded:
+            if one.body >= 0 and one.name in forces:
+                wrenches[:, one.body, :3] += forces[one.name]
+                wrenches[:, one.body, 3:] += cross(one.point, forces[one.name])
+            if one.body >= 0 and frames is not None:
+                wrenches[:, one.body, 3:] += cross(self.point_speed(one.name, None, frames), one.wrench[:, :3])
+        return np.asarray((self.axes * (self.topology.beyond @ wrenches)).sum(-1))
+
+    def _turned(self, joints: Any, vectors: FloatArray) -> FloatArray:
+        """Vectors in the axes of joints, shape (N or 1, ..., 3), in those of the world, shape (N, ..., 3)."""
+        return np.asarray((self.rotation[:, joints] @ vectors[..., None])[..., 0])
 
     def work_slopes(self, twists: FloatArray, each: FloatArray) -> FloatArray:
         """Derivatives of the virtual work by the twist of what is from each joint on, shape (N, n, L, 6), from `twists`."""

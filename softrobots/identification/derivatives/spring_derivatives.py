@@ -58,3 +58,15 @@ class SpringStates:
         for number, places, *_, by_moment in self._hinges:
             moments[..., number] -= (rates[..., places] * by_moment[:, None]).sum(-1)
         return {"stiffness": -rates * self._by_stiffness[:, None], "rest": self.tangent(rates), "moments": moments}
+
+    def rates(self, change: Mapping[str, FloatArray]) -> FloatArray:
+        """Rates of minus the torques, shape (N, n_strains), at rates of the numbers, shape (N or 1, ...) by the same names."""
+        loads: FloatArray = np.zeros(self._stretch.shape)
+        if "stiffness" in change:
+            loads -= self._by_stiffness * change["stiffness"]
+        if "rest" in change:
+            loads += self.tangent(np.broadcast_to(change["rest"], loads.shape)[:, None])[:, 0]
+        if "moments" in change:
+            for number, places, *_, by_moment in self._hinges:
+                loads[:, places] -= by_moment * change["moments"][:, number, None]
+        return loads

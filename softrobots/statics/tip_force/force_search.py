@@ -16,8 +16,11 @@ OBSERVABLE = 1e-3
 HIDDEN = 0.05
 """Share of the motor torques that may stay unexplained where a direction of the force is unobservable."""
 
-_FIRST_DAMPING = 0.03  # of the first step, relative to the reach: keeps the force small where it is barely observable
-_LAST_DAMPING = 1e-7
+FIRST_DAMPING = 0.03
+"""Damping of the first step, relative to the reach: keeps the force small where it is barely observable."""
+
+LAST_DAMPING = 1e-7
+"""Least damping above none."""
 
 State = TypeVar("State")
 """A robot in equilibrium, as the solver represents it."""
@@ -87,7 +90,7 @@ def search_force(
         The force, shape (3,) [N], the robot under it, and the number of steps.
     """
     force = np.zeros(3) if start is None else start
-    damping, spent = _FIRST_DAMPING * reach, 0
+    damping, spent = FIRST_DAMPING * reach, 0
     while spent < most:
         left, values, right, keep = problem.directions(state)
         missing = left[:, : len(values)].T @ problem.unexplained(state)
@@ -101,9 +104,9 @@ def search_force(
             left_over = left[:, : len(values)].T @ problem.unexplained(trial)
             if float(np.linalg.norm(left_over[keep])) < size:
                 force, state = force + step, trial
-                damping = 0.1 * damping if damping > _LAST_DAMPING * reach else 0.0
+                damping = 0.1 * damping if damping > LAST_DAMPING * reach else 0.0
                 continue
-        damping = max(10.0 * damping, 10.0 * _LAST_DAMPING * reach)
+        damping = max(10.0 * damping, 10.0 * LAST_DAMPING * reach)
     return force, state, spent
 
 
