@@ -71,7 +71,7 @@ class Symbols:
 
     def function(self, name: str, *, paired: bool) -> str:
         """Return the symbol of a function, of numbers or of pairs."""
-        symbol = f'@"{self._prefix}{name}{" of pairs" if paired else ""}"'
+        symbol = f'@"{self._prefix}{name}{".pairs" if paired else ""}"'
         self.needed[symbol] = name, paired
         return symbol
 
