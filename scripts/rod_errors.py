@@ -32,8 +32,9 @@ def parser() -> argparse.ArgumentParser:
     help_text = "pairs of hinges, flexures or sections (%(default)s)"
     result.add_argument("--count", type=int, default=30, metavar="N", help=help_text)
     result.add_argument("--duration", type=float, default=10.0, metavar="T", help="of the motion [s] (%(default)g)")
-    help_text = "steps of this length, of second order [s] (chosen by the error)"
+    help_text = "steps of this length [s] (chosen by the error)"
     result.add_argument("--time-step", type=float, metavar="H", help=help_text)
+    result.add_argument("--order", type=int, choices=(2, 4), default=2, help="of steps of a given length (%(default)d)")
     return result
 
 
@@ -44,7 +45,7 @@ def reference(rod: Any, force: float, duration: float) -> np.ndarray:
     return np.asarray(rod.tips(rod.equilibrium((force, 0.0)), duration, round(duration / ROW), int(np.ceil(ROW / step))))
 
 
-def off(rod: Any, form: str, count: int, force: float, path: np.ndarray, time_step: float | None) -> tuple[float, float]:
+def off(rod: Any, form: str, count: int, force: float, path: np.ndarray, steps: dict[str, Any]) -> tuple[float, float]:
     """Mean distance of the tip of one of our chains from a path [m], and seconds of the processor for a second of motion."""
     model = sr.load_model(
         sr.PccArm(
@@ -56,10 +57,8 @@ def off(rod: Any, form: str, count: int, force: float, path: np.ndarray, time_st
     gravity, duration, solver = (0.0, rod.gravity[0], rod.gravity[1]), ROW * (len(path) - 1), sr.compile(model)
     start = sr.solve_equilibrium(model, (), force=(force, 0.0, 0.0), gravity=gravity)
     options: dict[str, Any] = {
-        "start": start, "gravity": gravity, "damping_time": rod.retardation, "output_step": ROW,
+        "start": start, "gravity": gravity, "damping_time": rod.retardation, "output_step": ROW, **steps,
     }  # fmt: skip
-    if time_step is not None:
-        options |= {"time_step": time_step, "order": 2}
     solver.simulate(ROW, (), **options)  # compiles
     began = time.process_time()
     tips = solver.simulate(duration, (), **options).tip_position[:, [0, 2]]
@@ -71,13 +70,15 @@ def main(argv: list[str] | None = None) -> int:
     args = parser().parse_args(argv)
 
     def run() -> None:
-        step = None if args.time_step is None else positive_number("time_step", args.time_step, "s")
-        _table(positive_integer("count", args.count), positive_number("duration", args.duration, "s"), step)
+        steps: dict[str, Any] = {}
+        if args.time_step is not None:
+            steps = {"time_step": positive_number("time_step", args.time_step, "s"), "order": args.order}
+        _table(positive_integer("count", args.count), positive_number("duration", args.duration, "s"), steps)
 
     return exit_status(run)
 
 
-def _table(count: int, duration: float, step: float | None) -> None:
+def _table(count: int, duration: float, steps: dict[str, Any]) -> None:
     from tests.support.planar_rod import PlanarRod
 
     steel = PlanarRod(0.6, 0.8e-3, 200e9, 7850.0, gravity=(0.0, -9.81))
@@ -90,7 +91,7 @@ def _table(count: int, duration: float, step: float | None) -> None:
             path, aside = reference(fine, force, duration), fine.tip(fine.equilibrium((force, 0.0)))[0]
             coarse = reference(dataclasses.replace(fine, bends=bends - 1), force, duration)
             damped = dataclasses.replace(rod, retardation=damping)
-            found = {form: off(damped, form, count, force, path, step) for form in FORMS}
+            found = {form: off(damped, form, count, force, path, steps) for form in FORMS}
             cells = [f"{1e3 * error:.2g} mm" for error, _ in found.values()]
             cells.append(f"{1e3 * np.linalg.norm(path - coarse, axis=1).mean():.1g} mm")
             words = f"{1e3 * damping:g} ms" if damping else "none"

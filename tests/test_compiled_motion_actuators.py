@@ -233,12 +233,14 @@ def test_the_c_file_takes_the_same_steps(name: str, order: int, tmp_path: Path, 
 
 
 @pytest.mark.system
-@pytest.mark.timeout(900)  # machine code of many functions, for one case and for lanes
-def test_numba_takes_the_same_steps(rng: np.random.Generator) -> None:
+@pytest.mark.parametrize(
+    ("arm", "order"), [(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1), 2), (sr.PccArm(elastic_sections=1), 4)]
+)
+def test_numba_takes_the_same_steps(arm: Any, order: int, rng: np.random.Generator) -> None:
     """In lanes; a lane that fails there would be done alone."""
-    model = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1))
+    model = sr.load_model(arm)
     motors = np.array([inputs(model, rng) for _ in range(2)])
-    given = {"gravity": GRAVITY, "damping_time": 0.01, "time_step": 1e-3, "output_step": 1e-3}
+    given = {"gravity": GRAVITY, "damping_time": 0.01, "time_step": 1e-3, "output_step": 1e-3, "order": order}
     expected = sr.compile(model, backend="python").simulate(0.01, motors[1], **given)
     found = sr.compile(model, backend="numba").simulations(0.01, motors, **given)
     np.testing.assert_allclose(found.tip_position[1], expected.tip_position, rtol=0, atol=1e-11)

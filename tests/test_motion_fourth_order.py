@@ -80,7 +80,6 @@ def test_compiled_steps_are_those_of_simulate(kind: str) -> None:
 
 
 @pytest.mark.system
-@pytest.mark.timeout(900)  # numba compiles both functions of the rod
 @pytest.mark.parametrize("kind", ["arm", "rod"])
 def test_numba_and_the_c_file_take_the_same_steps(kind: str, tmp_path: Path) -> None:
     rod = sr.PccArm(muscle_azimuths=(), chain="lumped", hinges=4)

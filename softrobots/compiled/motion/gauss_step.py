@@ -45,16 +45,6 @@ def gauss_blocks(layout: MotionLayout) -> tuple[Block, Block, Block]:
     )
 
 
-def placing_blocks(layout: MotionLayout) -> list[Block]:
-    """Return the functions that write an unknown `i` at a stage to where the passes over the elements read it."""
-    blocks = [Block(f"place_{name}_stage", f"Place an unknown at the {name} stage.", ("i",)) for name in ("first", "second")]
-    for stage, block in enumerate(blocks):
-        places = layout.unknown, layout.rate, layout.acceleration
-        for place, value in zip(places, stage_values(layout, block, stage, base="i"), strict=True):
-            block.store(place, value, "i")
-    return blocks
-
-
 def place_block(layout: MotionLayout, places: Sequence[int]) -> Block:
     """Return the function that writes an unknown `i` at both stages, side by side, and its velocity and acceleration."""
     block = Block("place_stages", "Place an unknown at both stages.", ("i", "at"))
@@ -64,10 +54,11 @@ def place_block(layout: MotionLayout, places: Sequence[int]) -> Block:
     return block
 
 
-def keep_block(place: int, count: int) -> Block:
-    """Return the function that keeps the torque on a strain at the first stage, before those of the second are written."""
-    block = Block("keep_first_stage", "Keep the torque on a strain at the first stage.", ("i",))
-    block.store(place, block.load(place + count, "i"), "i")
+def copy_block(name: str, purpose: str, places: Sequence[tuple[int, int]], *bases: str) -> Block:
+    """Return the function that copies numbers of an unknown or a strain to and from where those of a stage stand."""
+    block = Block(name, purpose, ("i", "at"))
+    for to, source in places:
+        block.store(to, block.load(source, bases[1]), bases[0])
     return block
 
 

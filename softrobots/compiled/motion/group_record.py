@@ -39,9 +39,8 @@ class GroupRecord:
         if isinstance(negative, Expression) and negative.number in self._kept:
             return -self._kept[negative.number]
         if value.number not in self._kept:
-            base = "at" if block.loop is None else "at + stage"
-            block.store(self.size, value, base)
-            self._kept[value.number] = block.load(self.size, base)
+            block.store(self.size, value, block.each("at"))
+            self._kept[value.number] = block.load(self.size, block.each("at"))
             self.size += 1 if block.loop is None else self._stages
         return self._kept[value.number]
 

@@ -45,10 +45,10 @@ class GroupLayout:
     """First of the places."""
     unknowns: int
     """Number of unknown strains."""
-    parts: int = 1
-    """Parts of a number of the elimination: 2 where it is complex."""
+    free: int = 0
+    """Number of free coordinates of a robot with given lengths at both stages."""
     stages: int = 1
-    """Stages that are evaluated side by side; numbers of both stand side by side, too."""
+    """Stages of a step, whose numbers stand side by side; with two of them those of the elimination are complex."""
     frame: int = field(init=False)
     """Axes, angular velocity, angular acceleration and acceleration behind the last group of the outward pass (18, stages)."""
     origin: int = field(init=False)
@@ -69,8 +69,10 @@ class GroupLayout:
     """Cosine of each unknown that is an angle of a joint (n, stages)."""
     sine: int = field(init=False)
     """Its sine (n, stages)."""
+    coordinates: int = field(init=False)
+    """Free coordinates, their rates and accelerations (3, free, stages)."""
     state: int = field(init=False)
-    """The unknowns, their rates and accelerations, and torques of actuators, at stages side by side (4, n, stages)."""
+    """The strains, their rates and accelerations, and torques of actuators, at both stages (4, n, stages)."""
     bounds: int = field(init=False)
     """First and last bound of the loops (2)."""
     end: int = field(init=False)
@@ -78,15 +80,15 @@ class GroupLayout:
 
     def __post_init__(self) -> None:
         """Compute the places."""
-        n, k, s = self.unknowns, self.parts, self.stages
-        passes = dict(frame=18 * s, origin=3, inertia=21 * k, pull=12, wrench=6 * s, sums=6 * k, answer=6 * k)
-        state = 4 * n * s if s > 1 else 0
-        assign_places(self, self.first, **passes, base=18, cosine=n * s, sine=n * s, state=state, bounds=2, end=0)
+        n, s = self.unknowns, self.stages
+        passes = dict(frame=18 * s, origin=3, inertia=21 * s, pull=12, wrench=6 * s, sums=6 * s, answer=6 * s)
+        state = dict(coordinates=3 * self.free * s, state=4 * n * s if s > 1 else 0)
+        assign_places(self, self.first, **passes, base=18, cosine=n * s, sine=n * s, **state, bounds=2, end=0)
 
     @property
-    def index(self) -> str:
-        """Base of the numbers at all stages, in loops over them."""
-        return "" if self.stages == 1 else "stage"
+    def placed(self) -> int:
+        """Place of the unknowns at both stages, their rates and accelerations: free coordinates or strains."""
+        return self.coordinates if self.free else self.state
 
     @property
     def loop(self) -> tuple[str, int] | None:
@@ -124,27 +126,20 @@ def _trace_kind(
     factors = _trace_factors(factor, record, plan, places, group, moving.last(record, factor))
 
     stages = places.stages
-    total, loads = moved_wrench(vector(back.spaced(places.wrench, 6, stages, places.index)), moving.reach), []
+    total, loads = moved_wrench(vector(back.spaced(places.wrench, 6, stages, back.each())), moving.reach), []
     for joint, own in zip(moving.joints[::-1], moving.wrenches[::-1], strict=True):
         total = total + own
         loads.append(joint.load(total))
         total = total if joint.shift is None else moved_wrench(total, joint.shift)
-    back.store_spaced(places.wrench, total.tolist(), stages, places.index)
+    back.store_spaced(places.wrench, total.tolist(), stages, back.each())
     gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
     blocks, layout, n = [out, factor, back, step, place], plan.layout, places.unknowns
     if plan.reduces:
         written, read = plan.torques
-        if stages > 1:
-            back.store_spaced(written, gradient, stages, "2 * q + stage")
-        else:
-            back.store_all(plan.last_torques, gradient, "q")
+        back.store_spaced(written, gradient, stages, back.each(plan.row("q")))
         back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
         blocks.append(back)
-        spaced = plan.side_by_side and plan.routes is None
-        sides = [
-            back.spaced(read + stage, len(gradient), 2, "2 * q") if spaced else back.loads(read + stage * n, len(gradient), "q")
-            for stage in range(places.parts)
-        ]
+        sides = [back.spaced(read + stage, len(gradient), stages, plan.row("q")) for stage in range(stages)]
         gradient = right_hand_side(*sides) if layout.in_stages else [*sides[0]]
     reduced, sums = carried_inward(factors, gradient, _loaded(back, places.sums, 6, places))
     _store(back, places.sums, sums, places)
@@ -160,13 +155,13 @@ def _trace_kind(
 
 def _loaded(block: Block, place: int, count: int, places: GroupLayout) -> Vector:
     """Read real or complex numbers."""
-    values = block.loads(place, places.parts * count)
-    return vector(of_parts(values) if places.parts == 2 else values)
+    values = block.loads(place, places.stages * count)
+    return vector(of_parts(values) if places.stages == 2 else values)
 
 
 def _store(block: Block, place: int, values: Sequence[Scalar], places: GroupLayout) -> None:
     """Write real or complex numbers."""
-    block.store_all(place, parts_of(values) if places.parts == 2 else list(values))
+    block.store_all(place, parts_of(values) if places.stages == 2 else list(values))
 
 
 class _Moving(NamedTuple):
@@ -194,7 +189,7 @@ class _Moving(NamedTuple):
 
 
 def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: MovingGroup) -> _Moving:
-    frame = load_frame(out, places.frame, places.stages, places.index)
+    frame = load_frame(out, places.frame, places.stages, out.each())
     states, slopes = group.joints(out, places.cosine, places.sine)
     turns = {place: element.rotation for place, element in enumerate(group.elements)}
     joints, wrenches = [], []
@@ -209,7 +204,7 @@ def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: Mov
         joints.append(JointLine(record.keep(out, axis), kept_shift, axes, body, wrenches[-1][3:]))
     frame = replace(frame, axes=frame.axes @ group.turn)
     reach = frame.axes @ group.reach
-    store_frame(out, places.frame, frame.shifted(range(3), group.reach), places.stages, places.index)
+    store_frame(out, places.frame, frame.shifted(range(3), group.reach), places.stages, out.each())
     return _Moving(joints, wrenches, *(record.keep(out, one) for one in (reach, slopes, vector(group.torques))))
 
 

@@ -42,8 +42,8 @@ class MovingGroup:
     ) -> None:
         """Read the elements of the groups, base to tip, and their `moving_parts`.
 
-        In the block `q` is the place of the first unknown, or of the motor. Both stages of the unknowns, if the block loops
-        over them, and of what actuators do to them stand side by side from `state` on.
+        In the block `q` is the place of the first unknown, or of the motor. The unknowns at all stages, and what actuators do
+        to them, stand from `state` on, if the block loops over stages.
         """
         unknowns, layout = plan.unknowns, plan.layout
         self.elements: list[TracedElement] = []
@@ -68,7 +68,7 @@ class MovingGroup:
         place, routes = 0, plan.routes
         beside = [] if routes is None else [routes.unknowns.moving(row) for row in routes.routes.beside]
         within = {strain: number for strains in beside for number, strain in enumerate(strains)}
-        self._spacing, self._base = spacing, base = (1, "q") if state is None else (2, "2 * q + stage")
+        self._spacing, self._base = spacing, base = 1 if state is None else 2, block.each(plan.row("q"))
         firsts = [*plan.strains[:3], 0 if routes is None else routes.pulls]
         if state is not None:
             firsts = [state + 2 * len(unknowns.strains) * number for number in range(4)]

@@ -105,7 +105,7 @@ class MotionLayout:
     stages: int = field(init=False)
     """Accelerations of the unknowns at both stages (2, n)."""
     forces: int = field(init=False)
-    """What is out of balance on them there (2, n)."""
+    """What is out of balance on them there (n, 2)."""
     prepared: int = field(init=False)
     """Values that do not depend on the unknowns, factors, records: as many places as the code needs."""
 
@@ -167,7 +167,7 @@ class MotionPlan:
 
     @property
     def strains(self) -> tuple[int, int, int, int]:
-        """Place of the unknown strains, their rates, accelerations and dampers."""
+        """Place of the unknown strains, their rates and accelerations, of one stage, and dampers."""
         layout, routes = self.layout, self.routes
         if routes is None or not routes.held:
             return layout.unknown, layout.rate, layout.acceleration, layout.damping
@@ -183,20 +183,14 @@ class MotionPlan:
         """Whether torques out of balance are written first, and eliminated in a pass of their own."""
         return self.layout.in_stages or self.routes is not None or self.layout.full_damping
 
-    @property
-    def side_by_side(self) -> bool:
-        """Whether both stages of a step are evaluated at once; what holds given lengths is found stage by stage."""
-        return self.layout.in_stages and (self.routes is None or not self.routes.held)
+    def row(self, name: str) -> str:
+        """Return the base of the numbers of an unknown or a strain at all stages, which stand side by side."""
+        return f"2 * {name}" if self.layout.in_stages else name
 
     @property
     def torques(self) -> tuple[int, int]:
         """Where torques out of balance are written, and where they are read to be eliminated, at all stages."""
         return (self.layout.forces, self.layout.forces) if self.routes is None else (self.routes.torques, self.routes.sides)
-
-    @property
-    def last_torques(self) -> int:
-        """Where the torques out of balance of the stage that is evaluated are written, one stage after the other."""
-        return self.torques[0] + ((self.layout.strains or 0) if self.layout.in_stages else 0)
 
     def massive(self, block: Block) -> Scalar:
         """Return the factor of the mass in the matrix of a step: one and that of a damper times Rayleigh's factor."""

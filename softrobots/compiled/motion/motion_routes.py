@@ -45,11 +45,11 @@ class MotionRoutes:
     stiffness: int = field(init=False)
     """Derivative of each tension by the length, of the rows of the border (c) [N/m]."""
     arms: int = field(init=False)
-    """The rows of the border (c, n)."""
+    """The rows of the border (c, n), with given lengths at all stages (k, c, n)."""
     torques: int = field(init=False)
-    """What is out of balance on the strains (k, n) [N m or N]."""
+    """What is out of balance on the strains (n, k) [N m or N]."""
     sides: int = field(init=False)
-    """The same, or a row of the border, to be eliminated (k, n)."""
+    """The same, or a row of the border, to be eliminated (n, k)."""
     answers: int = field(init=False)
     """`X`, row by row (c, n), or real and imaginary parts."""
     products: int = field(init=False)
@@ -71,13 +71,13 @@ class MotionRoutes:
     damper: int = field(init=False)
     """Torque of one damper."""
     dampers: int = field(init=False)
-    """Torque of the dampers on each free coordinate (as many)."""
+    """Torque of the dampers on each free coordinate at all stages (n, k)."""
     sums: int = field(init=False)
     """The combinations of strains that the lengths hold (c)."""
     gaps: int = field(init=False)
     """What they miss, or how they change (c)."""
     closing: int = field(init=False)
-    """Derivative of the gaps by the sums and its factors (c, c)."""
+    """Derivative of the gaps by the sums and its factors, at all stages (k, c, c)."""
     slopes: int = field(init=False)
     """Derivative of each length by the strains (M, n)."""
     swerves: int = field(init=False)
@@ -90,12 +90,11 @@ class MotionRoutes:
     def __post_init__(self) -> None:
         """Compute the places."""
         n, c, k, muscles = len(self.unknowns.strains), self.rows, self.parts, len(self.unknowns.chain.actuators)
-        sizes = dict(
-            pulls=n, curvatures=0 if self.held else n * self.routes.stride, stiffness=c, arms=c * n, torques=k * n, sides=k * n
-        )
-        sizes |= dict(answers=k * c * n, products=k * c * c, system=k * c * c, multipliers=k * c, bound=1)
-        held = dict(strain=n, strain_rate=n, strain_change=n, correction=k * n, damper=1, dampers=n, sums=c, gaps=c)
-        held |= dict(closing=c * c, slopes=muscles * n, swerves=muscles, swerving=muscles)
+        arms = (k if self.held else 1) * c * n
+        sizes = dict(pulls=n, curvatures=0 if self.held else n * self.routes.stride, stiffness=c, arms=arms, torques=k * n)
+        sizes |= dict(sides=k * n, answers=k * c * n, products=k * c * c, system=k * c * c, multipliers=k * c, bound=1)
+        held = dict(strain=n, strain_rate=n, strain_change=n, correction=k * n, damper=1, dampers=k * n, sums=c, gaps=c)
+        held |= dict(closing=k * c * c, slopes=muscles * n, swerves=muscles, swerving=muscles)
         sizes |= {name: size if self.held else 0 for name, size in held.items()}
         assign_places(self, self.routes.end, **sizes, end=0)
 
@@ -113,6 +112,11 @@ class MotionRoutes:
     def lengths(self) -> HeldMotion:
         """The strains at given lengths."""
         return held_motion(self.unknowns)
+
+    @property
+    def border(self) -> int:
+        """Place of the rows at the last stage."""
+        return self.arms + (self.parts - 1) * self.rows * len(self.unknowns.strains) * self.held
 
     @property
     def stretched(self) -> list[int]:

@@ -8,7 +8,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.unrolled_chain import place_base
-from softrobots.compiled.motion.gauss_step import keep_block, place_block, placing_blocks
+from softrobots.compiled.motion.gauss_step import copy_block, place_block
 from softrobots.compiled.motion.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
 from softrobots.compiled.motion.motion_groups import motion_groups, reach_behind
 from softrobots.compiled.motion.motion_layout import MotionPlan
@@ -41,40 +41,25 @@ _ARTICULATE = """    start_articulate_SUFFIX(w)
 _RESIST = """    start_resist_SUFFIX(w)
     resist_all_SUFFIX(w)
 """
-_AT_STAGES = '''def resist_stage_SUFFIX(w: Array) -> None:
-    """Evaluate the stage that is placed."""
-EVALUATE
-
-def resist_stages_SUFFIX(w: Array) -> None:
-    """Evaluate both stages."""
-    for i in range(N):
-        place_first_stage_SUFFIX(w, i)
-    resist_stage_SUFFIX(w)
-    for i in range(N):
-        place_second_stage_SUFFIX(w, i)
-    for i in range(N_STRAINS):
-        keep_first_stage_SUFFIX(w, i)
-    resist_stage_SUFFIX(w)
-
-
-'''
-_SIDE_BY_SIDE = '''def resist_stages_SUFFIX(w: Array) -> None:
+_DAMP = """    for stage in range(N_STAGES):
+        find_dampers_SUFFIX(w, stage)
+"""
+_FREE = """    for stage in range(N_STAGES):
+        free_torques_SUFFIX(w, stage)
+"""
+_STAGES = '''def resist_stages_SUFFIX(w: Array) -> None:
     """Evaluate both stages side by side."""
     for i in range(N):
         place_stages_SUFFIX(w, i, 2 * i)
 EVALUATE
 
 '''
-_PULLS = """    for i in range(N):
-        place_first_stage_SUFFIX(w, i)
-    follow_actuators_SUFFIX(w)
-    for i in range(N_STRAINS):
-        keep_pull_SUFFIX(w, i, 2 * i)
-    for i in range(N):
-        place_second_stage_SUFFIX(w, i)
-    follow_actuators_SUFFIX(w)
-    for i in range(N_STRAINS):
-        keep_pull_SUFFIX(w, i, 2 * i + 1)
+_FOLLOW = """    for stage in range(N_STAGES):
+        for i in range(N):
+            take_stage_SUFFIX(w, i, N_STAGES * i + stage)
+        follow_actuators_SUFFIX(w, stage)
+        for i in range(N_STRAINS):
+            keep_stage_SUFFIX(w, i, N_STAGES * i + stage)
 """
 _MASSIVE = """    for i in range(N):
         for j in range(N):
@@ -91,7 +76,7 @@ CORRECT
 
 def motion_tip_SUFFIX(w: Array) -> None:
     """Write the tip at motors and unknowns."""
-TIP    start_place_SUFFIX(w)
+CLOSE    start_place_SUFFIX(w)
     place_all_SUFFIX(w)
     finish_place_SUFFIX(w)'''
 
@@ -102,20 +87,18 @@ def _control(plan: MotionPlan, bends: bool) -> str:
     held = routes is not None and routes.held
     move, resist, articulate, solve = _MOVE, _RESIST, _ARTICULATE, "    correct_all_SUFFIX(w)\n"
     if routes is not None:
-        follow = f"    {'move_lengths' if held else 'follow_actuators'}_SUFFIX(w)\n"
-        move = (_PULLS if plan.side_by_side else follow) + move
-        resist += "    free_torques_SUFFIX(w)\n" if held else ""
+        move = (_FOLLOW if in_stages else "    follow_actuators_SUFFIX(w, 0)\n") + move
         articulate += "    factor_border_SUFFIX(w)\n"
         solve = "    correct_strains_SUFFIX(w)\n" + ("    free_corrections_SUFFIX(w)\n" if held else "")
     elif plan.reduces:
         solve = "    reduce_all_SUFFIX(w)\n" + solve
-    resist += _MASSIVE if plan.layout.full_damping and not held else ""
+    massive = _MASSIVE if plan.layout.full_damping else ""
+    resist += _DAMP + massive + _FREE if held else massive
     evaluate = ("    resist_stages_SUFFIX(w)\n", "") if in_stages else (move, resist)
     text = _CONTROL.replace("FACTOR", evaluate[0] + articulate + evaluate[1] + solve)
     text = text.replace("CORRECT", "".join(evaluate) + solve)
-    text = text.replace("TIP", "    close_lengths_SUFFIX(w)\n" if held else "")
-    stages = _SIDE_BY_SIDE if plan.side_by_side else _AT_STAGES
-    text = stages.replace("EVALUATE", move + resist) + text if in_stages else text
+    text = text.replace("CLOSE", "    close_lengths_SUFFIX(w, 0)\n" if held else "")
+    text = _STAGES.replace("EVALUATE", move + resist) + text if in_stages else text
     return text.replace("BEND", _BEND if bends else "")
 
 
@@ -124,8 +107,8 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     unknowns, layout, routes = plan.unknowns, plan.layout, plan.routes
     in_stages, n = layout.in_stages, len(unknowns.strains)
     passes = _PASSES | ({"reduce": _REDUCE} if plan.reduces else {})
-    parts, stages = 2 if in_stages else 1, 2 if plan.side_by_side else 1
-    places = GroupLayout(layout.prepared if routes is None else routes.end, n, parts, stages)
+    first, free = (layout.prepared, 0) if routes is None else (routes.end, layout.unknowns * (in_stages and routes.held))
+    places = GroupLayout(first, n, free, 2 if in_stages else 1)
     actuators = None if routes is None else actuator_parts(plan, routes)
     kinds = group_kinds(plan, places)
     record, sequence = places.end, {}
@@ -146,7 +129,7 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     frame = [
         _prepare(plan, places, len(ordered)),
         _start_move(places),
-        *([_bend(places, places.state if plan.side_by_side else plan.strains[0])] if bends else []),
+        *([_bend(places, places.state if in_stages else plan.strains[0])] if bends else []),
         _start_articulate(plan, places),
         _start_resist(plan, places),
         _start_place(plan, places, len(ordered)),
@@ -155,7 +138,8 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         *([] if actuators is None else [_start_reduce(places), *actuators.blocks]),
         *([_add_mass(plan, places)] if layout.full_damping else []),
     ]
-    tables |= {"N_STRAINS": n, "N_BENDS": n * stages, "N_STAGES": stages} | ({} if actuators is None else actuators.tables)
+    tables |= {"N_STRAINS": n, "N_BENDS": n * places.stages, "N_STAGES": places.stages, "RATES": _rates(plan, places)}
+    tables |= {} if actuators is None else actuators.tables
     loops, lane_loops = (
         [
             *([] if actuators is None else actuators.loops(suffix)),
@@ -192,15 +176,25 @@ def _start_move(places: GroupLayout) -> Block:
 
 def _stage_blocks(plan: MotionPlan, places: GroupLayout) -> list[Block]:
     """Trace the functions that place both stages of a step."""
-    layout, routes, n = plan.layout, plan.routes, places.unknowns
-    if not plan.side_by_side:
-        return [*placing_blocks(layout), keep_block(plan.torques[0], n)] if layout.in_stages else []
-    blocks = [place_block(layout, [places.state + 2 * n * number for number in range(3)])]
+    layout, routes = plan.layout, plan.routes
+    if not layout.in_stages:
+        return []
+    placed = [places.placed + 2 * layout.unknowns * number for number in range(3)]
+    blocks = [place_block(layout, placed)]
     if routes is not None:
-        keep = Block("keep_pull", "Keep the torque of the actuators on a strain at a stage.", ("i", "at"))
-        keep.store(places.state + 6 * n, keep.load(routes.pulls, "i"), "at")
-        blocks += [*placing_blocks(layout), keep]
+        taken = zip((layout.unknown, layout.rate, layout.acceleration), placed, strict=True)
+        strains = (*plan.strains[:3], routes.pulls)
+        kept = [(places.state + 2 * places.unknowns * number, one) for number, one in enumerate(strains)]
+        blocks += [
+            copy_block("take_stage", "Take an unknown at a stage.", [*taken], "i", "at"),
+            copy_block("keep_stage", "Keep a strain at a stage.", kept if routes.held else kept[3:], "at", "i"),
+        ]
     return blocks
+
+
+def _rates(plan: MotionPlan, places: GroupLayout) -> int:
+    """Return the place of the rates of the unknowns at all stages."""
+    return places.placed + 2 * plan.layout.unknowns if plan.layout.in_stages else plan.layout.rate
 
 
 def _bend(places: GroupLayout, strains: int) -> Block:
@@ -214,7 +208,7 @@ def _bend(places: GroupLayout, strains: int) -> Block:
 
 def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_articulate", "Start at the tip with its force, without bodies beyond.")
-    block.store_all(places.inertia, [0.0] * 21 * places.parts)
+    block.store_all(places.inertia, [0.0] * 21 * places.stages)
     block.store_all(places.pull, [*_tip_force(plan, block), *[0.0] * 9])
     return block
 
@@ -223,8 +217,8 @@ def _start_resist(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_resist", "Start at the tip with its force, and clear all sums.")
     for stage in range(places.stages):
         block.store_spaced(places.wrench + stage, [0.0, 0.0, 0.0, *_tip_force(plan, block)], places.stages)
-    block.store_all(places.sums, [0.0] * 6 * places.parts)
-    block.store_all(places.answer, [0.0] * 6 * places.parts)
+    block.store_all(places.sums, [0.0] * 6 * places.stages)
+    block.store_all(places.answer, [0.0] * 6 * places.stages)
     return block
 
 
@@ -232,15 +226,15 @@ def _add_mass(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("add_mass", "Add a part of Rayleigh's term for the mass.", ("i", "at", "j"))
     layout, routes = plan.layout, plan.routes
     to = plan.torques[0] if routes is None or not routes.held else routes.dampers
-    rate = places.state + 2 * places.unknowns if plan.side_by_side else layout.rate
-    block.store(to, block.load(to, "i") + block.load(layout.mass_damping, "at") * block.load(rate, "j"), "i")
+    rate = block.load(_rates(plan, places), "j")
+    block.store(to, block.load(to, "i") + block.load(layout.mass_damping, "at") * rate, "i")
     return block
 
 
 def _start_reduce(places: GroupLayout) -> Block:
     block = Block("start_reduce", "Clear the sums over the torques out of balance.")
-    block.store_all(places.sums, [0.0] * 6 * places.parts)
-    block.store_all(places.answer, [0.0] * 6 * places.parts)
+    block.store_all(places.sums, [0.0] * 6 * places.stages)
+    block.store_all(places.answer, [0.0] * 6 * places.stages)
     return block
 
 

@@ -12,7 +12,7 @@ from softrobots.compiled.routes.loops import LENGTHS, PULLS, loops_of
 from softrobots.compiled.routes.motion_border import BORDER, border_blocks, factors_text
 from softrobots.compiled.routes.motion_follow import FOLLOW, SWERVE, arms_text, find_tensions, form_blocks, frame_blocks
 from softrobots.compiled.routes.motion_lengths import LENGTHS as HELD
-from softrobots.compiled.routes.motion_lengths import MASSIVE, held_blocks, keep_swerves, length_tables
+from softrobots.compiled.routes.motion_lengths import held_blocks, keep_swerves, length_tables
 from softrobots.compiled.routes.terms import form_of, length_blocks, route_forms
 from softrobots.compiled.trace.blocks import Block
 
@@ -107,7 +107,6 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
     if held:
         tables |= length_tables(plan, routes)
         blocks += held_blocks(plan, routes)
-        massive = MASSIVE if plan.layout.full_damping else ""
-        after = factors_text("closing") + HELD.replace("MASSIVE", massive)
+        after = factors_text("closing") + HELD
     after += factors_text("system") + BORDER
     return ActuatorParts([*blocks, *border_blocks(plan, routes)], tables, before, calls, after)

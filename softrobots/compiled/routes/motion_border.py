@@ -12,26 +12,26 @@ from softrobots.dynamics.gauss import SECOND
 
 def factors_text(name: str) -> str:
     """Return the loops that factor a matrix of as many rows as the border, and solve with it, without pivoting."""
-    return f'''def factor_{name}_SUFFIX(w: Array) -> None:
+    return f'''def factor_{name}_SUFFIX(w: Array, at: int) -> None:
     """Factor the matrix."""
     for j in range(N_BORDER):
-        invert_{name}_SUFFIX(w, (N_BORDER + 1) * j)
+        invert_{name}_SUFFIX(w, at + (N_BORDER + 1) * j)
         for m in range(j + 1, N_BORDER):
-            divide_{name}_SUFFIX(w, N_BORDER * m + j, (N_BORDER + 1) * j)
+            divide_{name}_SUFFIX(w, at + N_BORDER * m + j, at + (N_BORDER + 1) * j)
             for n in range(j + 1, N_BORDER):
-                subtract_{name}_SUFFIX(w, N_BORDER * m + n, N_BORDER * m + j, N_BORDER * j + n)
+                subtract_{name}_SUFFIX(w, at + N_BORDER * m + n, at + N_BORDER * m + j, at + N_BORDER * j + n)
 
 
-def solve_{name}_SUFFIX(w: Array) -> None:
+def solve_{name}_SUFFIX(w: Array, at: int) -> None:
     """Solve with the factors."""
     for m in range(N_BORDER):
         for j in range(m):
-            reduce_{name}_SUFFIX(w, m, N_BORDER * m + j, j)
+            reduce_{name}_SUFFIX(w, m, at + N_BORDER * m + j, j)
     for k in range(N_BORDER):
         row = N_BORDER - 1 - k
         for j in range(row + 1, N_BORDER):
-            reduce_{name}_SUFFIX(w, row, N_BORDER * row + j, j)
-        scale_{name}_SUFFIX(w, row, (N_BORDER + 1) * row)
+            reduce_{name}_SUFFIX(w, row, at + N_BORDER * row + j, j)
+        scale_{name}_SUFFIX(w, row, at + (N_BORDER + 1) * row)
 
 
 '''
@@ -69,8 +69,8 @@ def correct_strains_SUFFIX(w: Array) -> None:
         for n in range(N_BORDER):
             weigh_product_SUFFIX(w, N_BORDER * m + n, m)
         unite_system_SUFFIX(w, (N_BORDER + 1) * m)
-    factor_system_SUFFIX(w)
-    solve_system_SUFFIX(w)
+    factor_system_SUFFIX(w, 0)
+    solve_system_SUFFIX(w, 0)
     for m in range(N_BORDER):
         for i in range(N_STRAINS):
             take_answer_SUFFIX(w, i, m, N_STRAINS * m + i)
@@ -131,13 +131,10 @@ def border_blocks(plan: MotionPlan, routes: MotionRoutes) -> list[Block]:
         return stages[0] if parts == 1 else ComplexScalar(stages[0], stages[1] * SECOND)
 
     row = Block("take_row", "Take a row of the border as right-hand side.", ("i", "row"))
-    row.store(routes.sides, row.load(routes.arms, "row"), "i")
     torque = Block("take_torque", "Take the torques out of balance as right-hand side.", ("i",))
     for stage in range(parts):
-        place, index = (stage, "2 * i") if plan.side_by_side else (stage * n, "i")
-        torque.store(routes.sides + stage * n, torque.load(routes.torques + place, index), "i")
-        if stage:
-            row.store(routes.sides + stage * n, 0.0, "i")
+        torque.store(routes.sides + stage, torque.load(routes.torques + stage, plan.row("i")), plan.row("i"))
+        row.store(routes.sides + stage, 0.0 if stage else row.load(routes.border, "row"), plan.row("i"))
     keep = Block("keep_answer", "Keep the answer to a row of the border.", ("i", "row"))
     answers.store(keep, -correction(keep), "row")
     clear, clear_one = (
@@ -147,9 +144,9 @@ def border_blocks(plan: MotionPlan, routes: MotionRoutes) -> list[Block]:
     products.store(clear, 0.0 if parts == 1 else ComplexScalar(0.0, 0.0), "at")
     multipliers.store(clear_one, 0.0 if parts == 1 else ComplexScalar(0.0, 0.0), "m")
     add = Block("add_product", "Add the product of a row and an answer.", ("at", "row", "other"))
-    products.store(add, products.load(add, "at") + answers.load(add, "other") * add.load(routes.arms, "row"), "at")
+    products.store(add, products.load(add, "at") + answers.load(add, "other") * add.load(routes.border, "row"), "at")
     add_one = Block("add_multiplier", "Add the product of a row and the correction.", ("i", "m", "row"))
-    multipliers.store(add_one, multipliers.load(add_one, "m") + correction(add_one) * add_one.load(routes.arms, "row"), "m")
+    multipliers.store(add_one, multipliers.load(add_one, "m") + correction(add_one) * add_one.load(routes.border, "row"), "m")
     weigh = Block(
         "weigh_product", "Take a product times the stiffness of an actuator, where lengths are not given.", ("at", "m")
     )

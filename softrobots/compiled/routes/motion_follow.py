@@ -11,7 +11,7 @@ from softrobots.compiled.routes.terms import Form
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, if_less
 
-FOLLOW = '''def follow_actuators_SUFFIX(w: Array) -> None:
+FOLLOW = '''def follow_actuators_SUFFIX(w: Array, stage: int) -> None:
     """Find lengths and slopes of the actuators, and what they do to the strains."""
     start_routes_SUFFIX(w)
     for i in range(N_STRAINS):

@@ -12,12 +12,6 @@ from softrobots.compiled.trace.expressions import absolute, smaller
 _CLOSED = 1e-12  # largest gap of the lengths [m], as in `softrobots.model.muscle_lengths`
 _CLOSINGS = 4  # of Newton's method, from the last strains; one is exact for lengths that are linear
 
-MASSIVE = """    for i in range(N):
-        for j in range(N):
-            add_mass_SUFFIX(w, i, N * i + j, j)
-"""
-"""Adds Rayleigh's term for the mass to the torques of the dampers."""
-
 LENGTHS = '''def combine_strains_SUFFIX(w: Array, to: int, coordinates: int, sums: int) -> None:
     """Combine free coordinates, held sums, or their rates, to strains."""
     for i in range(N_STRAINS):
@@ -28,8 +22,10 @@ LENGTHS = '''def combine_strains_SUFFIX(w: Array, to: int, coordinates: int, sum
             add_shared_SUFFIX(w, to + i, sums + SHARED_PLACE[k], k)
 
 
-def follow_lengths_SUFFIX(w: Array) -> None:
+def follow_lengths_SUFFIX(w: Array, stage: int) -> None:
     """Find the strains, their lengths and the gaps, and factor the derivative of the gaps by the sums."""
+    arms = ARMS + N_BORDER * N_STRAINS * stage
+    closing = N_BORDER * N_BORDER * stage
     combine_strains_SUFFIX(w, STRAIN, UNKNOWN, SUMS)
     start_routes_SUFFIX(w)
     follow_all_SUFFIX(w)
@@ -38,30 +34,30 @@ def follow_lengths_SUFFIX(w: Array) -> None:
         for k in range(HELD_FIRST[m], HELD_FIRST[m + 1]):
             add_gap_SUFFIX(w, m, HELD_PLACE[k], k)
         for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
-            clear_number_SUFFIX(w, ARMS + N_STRAINS * m + i)
+            clear_number_SUFFIX(w, arms + N_STRAINS * m + i)
             for k in range(HELD_FIRST[m], HELD_FIRST[m + 1]):
-                add_held_SUFFIX(w, ARMS + N_STRAINS * m + i, LENGTH_SLOPES + N_STRAINS * ROW_OF_MUSCLE[HELD_PLACE[k]] + i, k)
+                add_held_SUFFIX(w, arms + N_STRAINS * m + i, LENGTH_SLOPES + N_STRAINS * ROW_OF_MUSCLE[HELD_PLACE[k]] + i, k)
         for n in range(N_BORDER):
-            clear_number_SUFFIX(w, CLOSING + N_BORDER * m + n)
+            clear_number_SUFFIX(w, CLOSING + closing + N_BORDER * m + n)
         for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
             for k in range(SHARED_FIRST[i], SHARED_FIRST[i + 1]):
-                add_shared_SUFFIX(w, CLOSING + N_BORDER * m + SHARED_PLACE[k], ARMS + N_STRAINS * m + i, k)
-    factor_closing_SUFFIX(w)
+                add_shared_SUFFIX(w, CLOSING + closing + N_BORDER * m + SHARED_PLACE[k], arms + N_STRAINS * m + i, k)
+    factor_closing_SUFFIX(w, closing)
 
 
-def close_lengths_SUFFIX(w: Array) -> None:
+def close_lengths_SUFFIX(w: Array, stage: int) -> None:
     """Find the strains that have the given lengths."""
     for step in range(N_CLOSINGS):
-        follow_lengths_SUFFIX(w)
-        solve_closing_SUFFIX(w)
+        follow_lengths_SUFFIX(w, stage)
+        solve_closing_SUFFIX(w, N_BORDER * N_BORDER * stage)
         for m in range(N_BORDER):
             close_gap_SUFFIX(w, m)
-    follow_lengths_SUFFIX(w)
+    follow_lengths_SUFFIX(w, stage)
     for m in range(N_BORDER):
         judge_gap_SUFFIX(w, m)
 
 
-def hold_lengths_SUFFIX(w: Array, to: int, coordinates: int, given: int) -> None:
+def hold_lengths_SUFFIX(w: Array, to: int, coordinates: int, given: int, stage: int) -> None:
     """Combine strains from rates of the free coordinates and of the lengths."""
     for m in range(N_BORDER):
         clear_number_SUFFIX(w, GAPS + m)
@@ -70,57 +66,63 @@ def hold_lengths_SUFFIX(w: Array, to: int, coordinates: int, given: int) -> None
         for k in range(HELD_FIRST[m], HELD_FIRST[m + 1]):
             add_held_SUFFIX(w, GAPS + m, given + HELD_PLACE[k], k)
         for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
-            take_product_SUFFIX(w, GAPS + m, ARMS + N_STRAINS * m + i, to + i)
-    solve_closing_SUFFIX(w)
+            take_product_SUFFIX(w, GAPS + m, ARMS + N_STRAINS * (N_BORDER * stage + m) + i, to + i)
+    solve_closing_SUFFIX(w, N_BORDER * N_BORDER * stage)
     for i in range(N_STRAINS):
         for k in range(SHARED_FIRST[i], SHARED_FIRST[i + 1]):
             add_shared_SUFFIX(w, to + i, GAPS + SHARED_PLACE[k], k)
 
 
-def move_lengths_SUFFIX(w: Array) -> None:
+def follow_actuators_SUFFIX(w: Array, stage: int) -> None:
     """Find strains, rates and accelerations that have the given lengths."""
-    close_lengths_SUFFIX(w)
+    close_lengths_SUFFIX(w, stage)
     for i in range(N_STRAINS):
         clear_pull_SUFFIX(w, i)
     bar_SUFFIX(w)
-    hold_lengths_SUFFIX(w, STRAIN_RATE, RATE, MOTOR_VELOCITIES + N_JOINTS)
+    hold_lengths_SUFFIX(w, STRAIN_RATE, RATE, MOTOR_VELOCITIES + N_JOINTS, stage)
     clear_swerving_SUFFIX(w)
     swerve_all_SUFFIX(w)
     for m in range(N_LENGTHS):
         steady_SUFFIX(w, m)
-    hold_lengths_SUFFIX(w, STRAIN_CHANGE, ACCELERATION, SWERVES)
+    hold_lengths_SUFFIX(w, STRAIN_CHANGE, ACCELERATION, SWERVES, stage)
 
 
-def free_torques_SUFFIX(w: Array) -> None:
-    """Take what holds the lengths from the torques out of balance that were written last, and add those of the dampers."""
+def find_dampers_SUFFIX(w: Array, stage: int) -> None:
+    """Find the torques of the dampers on the free coordinates."""
+    for i in range(N):
+        clear_number_SUFFIX(w, DAMPERS + N_STAGES * i + stage)
+    for i in range(N_STRAINS):
+        clear_number_SUFFIX(w, DAMPER)
+        for k in range(FREE_FIRST[i], FREE_FIRST[i + 1]):
+            add_free_SUFFIX(w, DAMPER, RATES + N_STAGES * FREE_PLACE[k] + stage, k)
+        find_damper_SUFFIX(w, i)
+        for k in range(FREE_FIRST[i], FREE_FIRST[i + 1]):
+            add_free_SUFFIX(w, DAMPERS + N_STAGES * FREE_PLACE[k] + stage, DAMPER, k)
+
+
+def free_torques_SUFFIX(w: Array, stage: int) -> None:
+    """Take what holds the lengths from the torques out of balance, and add those of the dampers."""
+    arms = ARMS + N_BORDER * N_STRAINS * stage
+    closing = N_BORDER * N_BORDER * stage
     for m in range(N_BORDER):
         clear_number_SUFFIX(w, GAPS + m)
     for i in range(N_STRAINS):
         for k in range(SHARED_FIRST[i], SHARED_FIRST[i + 1]):
-            add_shared_SUFFIX(w, GAPS + SHARED_PLACE[k], LAST_TORQUES + i, k)
+            add_shared_SUFFIX(w, GAPS + SHARED_PLACE[k], TORQUES + N_STAGES * i + stage, k)
     for m in range(N_BORDER):
         for j in range(m):
-            reduce_closing_SUFFIX(w, m, N_BORDER * j + m, j)
-        scale_closing_SUFFIX(w, m, (N_BORDER + 1) * m)
+            reduce_closing_SUFFIX(w, m, closing + N_BORDER * j + m, j)
+        scale_closing_SUFFIX(w, m, closing + (N_BORDER + 1) * m)
     for k in range(N_BORDER):
         row = N_BORDER - 1 - k
         for j in range(row + 1, N_BORDER):
-            reduce_closing_SUFFIX(w, row, N_BORDER * j + row, j)
+            reduce_closing_SUFFIX(w, row, closing + N_BORDER * j + row, j)
     for m in range(N_BORDER):
         for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
-            take_product_SUFFIX(w, LAST_TORQUES + i, ARMS + N_STRAINS * m + i, GAPS + m)
+            take_product_SUFFIX(w, TORQUES + N_STAGES * i + stage, arms + N_STRAINS * m + i, GAPS + m)
     for i in range(N):
-        clear_number_SUFFIX(w, DAMPERS + i)
-    for i in range(N_STRAINS):
-        clear_number_SUFFIX(w, DAMPER)
-        for k in range(FREE_FIRST[i], FREE_FIRST[i + 1]):
-            add_free_SUFFIX(w, DAMPER, RATE + FREE_PLACE[k], k)
-        find_damper_SUFFIX(w, i)
-        for k in range(FREE_FIRST[i], FREE_FIRST[i + 1]):
-            add_free_SUFFIX(w, DAMPERS + FREE_PLACE[k], DAMPER, k)
-MASSIVE    for i in range(N):
         for k in range(ELASTIC_FIRST[i], ELASTIC_FIRST[i + 1]):
-            add_elastic_SUFFIX(w, LAST_TORQUES + ELASTIC_PLACE[k], DAMPERS + i, k)
+            add_elastic_SUFFIX(w, TORQUES + N_STAGES * ELASTIC_PLACE[k] + stage, DAMPERS + N_STAGES * i + stage, k)
 
 
 def free_corrections_SUFFIX(w: Array) -> None:
@@ -158,10 +160,9 @@ def length_tables(plan: MotionPlan, routes: MotionRoutes) -> dict[str, object]:
         "ROW_OF_MUSCLE": tuple(routes.stretched.index(one) for one in range(len(chain.actuators))),
         "LENGTH_REST": tuple(chain.muscle_paths.rest.tolist()),
         "LENGTH_SLOPES": routes.slopes,
-        "LAST_TORQUES": plan.last_torques,
+        "TORQUES": routes.torques,
         "STRAIN_CORRECTION": routes.correction,
         "N_CLOSINGS": 1 if given.linear else _CLOSINGS,
-        "N_STAGES": routes.parts,
         "N_LENGTHS": len(chain.actuators),
         "N_JOINTS": chain.n_motors,
     }

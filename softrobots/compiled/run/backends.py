@@ -12,7 +12,7 @@ import shutil
 import sys
 import tempfile
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
@@ -33,16 +33,24 @@ RESPONSES = tuple(f"{way}_{kind}_batch" for way in ("pull", "push") for kind in 
 BACKENDS = ("numba", "python")
 """Names of the back ends, the preferred one first."""
 
+_SINGLE = (
+    *("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip"),
+    *("motion_step", "motion_run", "place_at"),
+)
+_BATCHES = ("settle_batch", "estimate_batch", "reach_batch", "motion_batch", "respond_batch", *RESPONSES)
+
 _NUMBA_HEAD = """from __future__ import annotations
 
 import numpy as np
 from numba import njit
+from numba.extending import intrinsic
 
-from softrobots.compiled.run.pairs import fabs, floor, load_pair, sqrt, store_pair, where
+from softrobots.compiled.run.machine_code import fabs, floor, lowered, sqrt, where
 
 zeros = np.zeros
-
 """
+_KERNEL_FUNCTION = re.compile(r"def (\w+)\(((?:\s*\w+: (?:Array|int|float),?)*\s*)\) -> (?:None|int|float|bool):")
+_INTRINSIC = "@intrinsic\ndef {name}(typing, {given}):\n    return lowered(KERNEL, globals(), {name!r}, {given})"
 
 
 def available_backend() -> str:
@@ -56,10 +64,8 @@ class Run:
     def __init__(self, program: Program, functions: Any) -> None:
         """Look up the functions; those that the program lacks are None."""
         self.program, self.layout = program, program.layout
-        single, motion = ("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip"), ("motion_step", "motion_run")
-        batches = ("settle_batch", "estimate_batch", "reach_batch", "motion_batch", "respond_batch", *RESPONSES)
-        for name in (*single, *motion, "place_at", *batches):
-            setattr(self, name, getattr(functions, name, None))
+        for name in (*_SINGLE, *_BATCHES):
+            setattr(self, name, getattr(functions, f"{name}_alone", getattr(functions, name, None)))
 
     def workspace(self) -> Any:
         """Return a workspace of one case, all zeros."""
@@ -125,22 +131,34 @@ class NumbaRun(Run):
         """
         if importlib.util.find_spec("numba") is None:
             raise MissingDependency("numba", "fast")
-        from softrobots.compiled.run.pairs import in_pairs
+        super().__init__(program, numba_module(f"{program.text}\n\n{program.lane_text}", _SINGLE))
 
-        functions = _decorated(in_pairs(program.text) + "\n\n" + program.lane_text)
-        functions = re.sub(r"^([A-Z_0-9]+) = (\(.*\))$", r"\1 = np.array(\2)", functions, flags=re.MULTILINE)
-        head, rest = functions.split('"""\n', 1)  # the docstring stays first
-        super().__init__(program, _module(f'{head}"""\n\n{_NUMBA_HEAD}\n{rest}'))
+
+def numba_module(text: str, single: Collection[str]) -> ModuleType:
+    """Return a module whose functions in the kernel language are those of `softrobots.compiled.run.machine_code`.
+
+    numba compiles all other functions itself, and for callers in Python those with names in `single`, which end in `_alone`.
+    """
+    head, *functions = re.split(r"\n\n+(?=def )", text.rstrip())
+    docstring, constants = head.split('"""\n', 1)  # the docstring stays first
+    found = [(_KERNEL_FUNCTION.match(one), one) for one in functions]
+    given = {one[1]: ", ".join(re.findall(r"(\w+):", one[2])) for one, _ in found if one}
+    others = [one for in_kernel, one in found if not in_kernel]
+    others += [f"def {name}_alone({given[name]}):\n    return {name}({given[name]})" for name in single if name in given]
+    called = set(re.findall(r"(\w+)\(", "\n".join(others)))
+    parts = [f'{docstring}"""', _NUMBA_HEAD, constants, "KERNEL = r'''", *(one for in_kernel, one in found if in_kernel), "'''"]
+    parts += [_INTRINSIC.format(name=name, given=names) for name, names in given.items() if name in called]
+    return _module("\n\n".join([*parts, _decorated("\n\n".join(others))]) + "\n")
 
 
 def jitted(constants: str, functions: str) -> ModuleType:
     """Return functions of the package as numba compiles them, from the text of their constants and their own."""
-    return _module(f"{_NUMBA_HEAD}from math import copysign, cos, sin\n\n{constants}\n\n\n{_decorated(functions)}\n")
+    return _module(f"{_NUMBA_HEAD}\nfrom math import copysign, cos, sin\n\n{constants}\n\n\n{_decorated(functions)}\n")
 
 
 def _decorated(functions: str) -> str:
     """Return functions with numba's decorators."""
-    from softrobots.compiled.run.pairs import FASTMATH
+    from softrobots.compiled.translate.llvm_expressions import FASTMATH
 
     fastmath = ", ".join(map(repr, FASTMATH))
     decorator = f"@njit(cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, fastmath={{{fastmath}}})\n"

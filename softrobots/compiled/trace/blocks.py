@@ -40,6 +40,10 @@ class Block:
     loop: tuple[str, int] | None = None
     """Name and number of the rounds of a loop over all that depends on bases with this name; None: all is done once."""
 
+    def each(self, base: str = "") -> str:
+        """Return the base of numbers that each round of the loop has, side by side from another base on."""
+        return base if self.loop is None else f"{base} + {self.loop[0]}" if base else self.loop[0]
+
     def load(self, offset: int, base: str = "") -> Expression:
         """Return an element of the workspace."""
         return self.trace.load(WORKSPACE, base, offset)
