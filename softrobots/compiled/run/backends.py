@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import atexit
 import hashlib
+import importlib
 import importlib.util
+import inspect
 import math
 import os
 import re
@@ -146,9 +148,18 @@ def numba_module(text: str, single: Collection[str]) -> ModuleType:
     others = [one for in_kernel, one in found if not in_kernel]
     others += [f"def {name}_alone({given[name]}):\n    return {name}({given[name]})" for name in single if name in given]
     called = set(re.findall(r"(\w+)\(", "\n".join(others)))
-    parts = [f'{docstring}"""', _NUMBA_HEAD, constants, "KERNEL = r'''", *(one for in_kernel, one in found if in_kernel), "'''"]
+    kernel = "\n\n".join(["KERNEL = r'''", *(one for in_kernel, one in found if in_kernel), "'''"])
+    parts = [f'{docstring}"""', f"# By {_emitter()}", _NUMBA_HEAD, constants, kernel]
     parts += [_INTRINSIC.format(name=name, given=names) for name, names in given.items() if name in called]
     return _module("\n\n".join([*parts, _decorated("\n\n".join(others))]) + "\n")
+
+
+@lru_cache(maxsize=1)
+def _emitter() -> str:
+    """Digest of the modules that write text for LLVM: what another version of them wrote is not taken from the disk."""
+    names = ("translate.llvm", "translate.llvm_expressions", "run.machine_code")
+    texts = (inspect.getsource(importlib.import_module(f"softrobots.compiled.{name}")) for name in names)
+    return hashlib.sha256("".join(texts).encode()).hexdigest()[:24]
 
 
 def jitted(constants: str, functions: str) -> ModuleType:
