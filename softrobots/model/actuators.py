@@ -27,7 +27,7 @@ from softrobots.model.actuator_laws import (
 )
 from softrobots.model.muscle_lengths import MuscleLengths
 
-_TAUT = 1e-7  # tension of a tendon that is just taut, relative to what is worth a radian
+_TAUT = 1e-9  # tension of a tendon that is just taut, relative to what is worth a radian: it hardly moves a tip
 _BEYOND = 2.5  # times the limit of an angle, from which on it is hardly in rad
 _MOST_DEGREES = 3.6e4  # a hundred turns, beyond which a number is something else
 _FAR = 30.0  # times the limit of a slide, from which on it is hardly in m
