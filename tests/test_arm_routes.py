@@ -315,12 +315,16 @@ def test_bad_routes_are_refused(fields: dict[str, Any], field: str) -> None:
 
 FITS = sr.Route(at=(0.0, 0.1), azimuth=0.0, distance=0.004)
 FAR = sr.Route(at=(0.0, 1.1), azimuth=0.0, distance=0.004)
+SHORT = sr.Route(at=(1.048 - 1e-11, 1.048), azimuth=0.0, distance=0.004)
 
 
 @each_row(
     ("kind", "parameters", "field"),
     [
-        *((sr.PccArm, {"routing": value}, "routing") for value in ("tip", 0, 3, True, None, [], ["base"], ("base", 3), [FAR])),
+        *(
+            (sr.PccArm, {"routing": value}, "routing")
+            for value in ("tip", 0, 3, True, None, [], ["base"], ("base", 3), [FAR], [SHORT])
+        ),
         *(
             (sr.PccArm, {"routing": value}, "routing")
             for value in (b"base", math.nan, [FITS, "base"], [{"at": (0, 1)}], {"at": 1}, [{1: 2, "at": 3}])
