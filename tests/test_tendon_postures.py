@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -251,6 +251,27 @@ def test_slack_tendons_feel_nothing(rng: np.random.Generator) -> None:
     found = sr.estimate_load(arm, motors, under.muscle_forces, restart=False)
     assert len(found.unobservable_directions) >= 1
     assert found.singular_values[2] == 0.0
+
+
+@pytest.mark.parametrize("robot", [sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1), ROBOTS["mckibben"]])
+def test_what_only_pulls_has_no_tension_below_zero(robot: Any) -> None:
+    """Before a search, in both solvers; noise of a known size may be below zero."""
+    arm = sr.load_model(robot)
+    tensions = np.full(arm.n_motors, 5.0)
+    tensions[1] = -1.0
+    for call in (sr.compile(arm).estimate_load, partial(sr.estimate_load, arm)):
+        with pytest.raises(sr.ParameterError, match=rf"0 or above, within 5 torque_std, of {arm.motor_joints[1]}, "):
+            call(arm.relaxed_motors, tensions)
+    free = sr.solve_equilibrium(arm, arm.relaxed_motors)
+    noise = np.where(np.arange(arm.n_motors) == 1, -0.1 - free.muscle_forces, 0.0)
+    found = sr.estimate_load(arm, arm.relaxed_motors, free.muscle_forces + noise, torque_std=100.0, restart=False)
+    assert found.measured_torques[1] == pytest.approx(-0.1, rel=1e-12)
+
+
+def test_tensions_are_told_in_newtons() -> None:
+    arm = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1))
+    with pytest.raises(sr.LoadNotFound, match=r"\] by 'newton' in \d+ iterations: [\d.]+ N remain$"):
+        sr.estimate_load(arm, arm.relaxed_motors, (1e3, 1.0, 1.0), restart=False, max_iterations=5)
 
 
 @pytest.mark.parametrize("name", ["tension", "pressure"])
