@@ -152,6 +152,19 @@ def test_given_lengths_need_no_more_than_tensions_known_to_suffice(rng: np.rando
         assert size <= 1.0001 * np.linalg.norm(tensions) + 1e-5
 
 
+@pytest.mark.parametrize("kind", ["length", "elastic"])
+def test_a_workspace_has_only_what_tendons_can_hold(kind: str) -> None:
+    """Every sample, solved again, is within all limits: none pushes; the others are counted as refused."""
+    arm = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1, kind=kind))
+    sampled = sr.sample_workspace(arm, 20, gravity=DOWN)
+    assert 4 <= len(sampled.q_motors) == 20 - sampled.refused
+    for motors, springs, tip in zip(sampled.q_motors, sampled.q_springs, sampled.tip_positions, strict=True):
+        again = sr.solve_equilibrium(arm, motors, gravity=DOWN, q_springs0=springs)
+        assert again.within_limits
+        assert again.stable
+        assert np.abs(again.tip_position - tip).max() <= 1e-9  # as the residual leaves it
+
+
 @pytest.mark.parametrize(
     ("robot", "height"),
     [
@@ -259,12 +272,14 @@ def test_what_only_pulls_has_no_tension_below_zero(robot: Any) -> None:
     arm = sr.load_model(robot)
     tensions = np.full(arm.n_motors, 5.0)
     tensions[1] = -1.0
-    for call in (sr.compile(arm).estimate_load, partial(sr.estimate_load, arm)):
+    for call in (sr.compile(arm, backend="python").estimate_load, partial(sr.estimate_load, arm)):
         with pytest.raises(sr.ParameterError, match=rf"0 or above, within 5 torque_std, of {arm.motor_joints[1]}, "):
             call(arm.relaxed_motors, tensions)
     free = sr.solve_equilibrium(arm, arm.relaxed_motors)
     noise = np.where(np.arange(arm.n_motors) == 1, -0.1 - free.muscle_forces, 0.0)
-    found = sr.estimate_load(arm, arm.relaxed_motors, free.muscle_forces + noise, torque_std=100.0, restart=False)
+    found = sr.estimate_load(
+        arm, arm.relaxed_motors, free.muscle_forces + noise, torque_std=100.0, restart=False, max_iterations=5
+    )
     assert found.measured_torques[1] == pytest.approx(-0.1, rel=1e-12)
 
 

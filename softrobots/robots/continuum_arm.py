@@ -252,10 +252,10 @@ class ContinuumArm(XacroRobot):
         if self.routes:
             names = (f"{prefix}azimuths", f"{prefix}azimuth_deviation", f"{prefix}distance")
             refuse_given(self, names, "where routing lists the routes")
-            straight = type(self).__dataclass_fields__[names[-1]]
-            distances = [distance for route in self.routes for distance in route.distance]
-            if questionable(straight, distances):
-                question_length("distance of a route", max(distances), float(straight.default))
+            straight: Any = type(self).__dataclass_fields__[names[-1]]
+            farthest = float(max(np.max(route.distance) for route in self.routes))
+            if questionable(straight, (farthest,)):
+                question_length("distance of a route", farthest, straight.default)
         least, most = f"{prefix}least_tension", f"{prefix}force"
         if getattr(self, least) is not None and any(
             low >= high for low, high in zip(self.by_actuator(least), self.by_actuator(most), strict=True)

@@ -164,7 +164,7 @@ def solve_ik(
     wrist = spherical_wrist(model) if goal.rows == 6 else None
     for tried in [begins] if wrist is None else [[first, *wrist.starts(tip, begins)], begins[1:]]:
         for start in tried:
-            local = search(tip, *tip.begin(start, tolerance), home=first, tolerance=tolerance)
+            local = search(tip, *tip.begin(start, model.rest, tolerance), home=first, tolerance=tolerance)
             if local is not None:
                 ended.append(local)
                 if first_decides and local.arrived(tolerance) and allowed(local):

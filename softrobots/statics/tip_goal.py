@@ -163,27 +163,27 @@ class LoadedTip:
         translation, turn = self.goal.missing(self.model, state.q)
         return LocalSolution(q_motors, state, float(np.linalg.norm(translation)), float(np.linalg.norm(turn)), excess)
 
-    def begin(self, q_motors: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
+    def begin(self, q_motors: FloatArray, start: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
         """Return actuators and elastic coordinates to search from, shapes (n_motors,) and (n_springs,).
 
-        Tendons of given length begin at the least tensions near `q_motors` that put the tip at the goal. Which tensions hold
-        a pose does not depend on what is given, and only among tensions their limits are flat: the multipliers of given
-        lengths change with the stiffness of the backbone, and a search among those creeps along their limits. Where given
-        tensions find nothing, as where only held lengths are stable, and for all others it is `q_motors`, at rest.
+        Redundant tendons of given length begin at the least tensions near `q_motors` that put the tip at the goal. Which
+        tensions hold a pose does not depend on what is given, and only among tensions their limits are flat: those of given
+        lengths change with the stiffness of the backbone, and a search among lengths creeps along them. Where given tensions
+        find nothing, as where only held lengths are stable, and for all others it is `q_motors` and `start`.
         """
         model, actuators, structure = self.model, self.model.actuators, self.model.structure
-        held = self.solve(q_motors, model.rest) if structure.muscle_lengths and actuators.least_tension else None
+        redundant = actuators.least_tension and actuators.basis.shape[1] > self.rows
+        held = self.solve(q_motors, start) if redundant and structure.muscle_lengths else None
         if held is None or structure.muscle_lengths is None:
-            return q_motors, model.rest
+            return q_motors, start
         pulled, count = with_given_forces(model), len(structure.motor_joints)
-        start = np.clip(np.concatenate([q_motors[:count], held.state.load.motors[count:]]), *pulled.motor_limits.T)
+        tensions = np.clip(np.concatenate([q_motors[:count], held.state.load.motors[count:]]), *pulled.motor_limits.T)
         strains = structure.strains(q_motors, held.state.q_springs)
-        found = search(replace(self, model=pulled), start, strains, tolerance=tolerance)
+        found = search(replace(self, model=pulled), tensions, strains, tolerance=tolerance)
         if found is None or not found.arrived(tolerance):
-            return q_motors, model.rest
-        lengths = structure.muscle_paths.at(found.state.q_springs).change + structure.muscle_paths.rest
-        motors = np.concatenate([found.q_motors[:count], lengths])
-        return actuators.go(q_motors, motors - q_motors), structure.muscle_lengths.elastic @ found.state.q_springs
+            return q_motors, start
+        motors, elastic = structure.muscle_lengths.held(found.q_motors[:count], found.state.q_springs)
+        return actuators.go(q_motors, motors - q_motors), elastic
 
     def missing(self, state: ElasticState) -> FloatArray:
         """Return the difference from the tip to the goal, shape (3 or 6,), rotations times the lever [m]."""

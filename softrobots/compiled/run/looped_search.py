@@ -107,8 +107,7 @@ class LoopedSearch:
         """Find actuators that put the tip within the tolerance [m] of a target, from given ones and elastic coordinates."""
         tip = _SoughtTip(self.model, self, force, gravity, target)
         first = self.model.actuators.go(q_motors, np.zeros(len(q_motors)))  # within the limits
-        if self.model.actuators.least_tension and self.model.muscle_input == "lengths":
-            first, start = tip.loaded.begin(first, tolerance)
+        first, start = tip.loaded.begin(first, start, tolerance)
         status, state = self.settle(first, force, gravity, start)
         found = search(tip, first, start, tolerance=tolerance) if status == Status.CERTIFIED else None
         if found is None:
