@@ -78,6 +78,11 @@ REFUSED = [
     ((ALONG_1,), {"kind": "elastic", "stiffness": 0}, "has stiffness 0.0; a positive number"),
     ((ALONG_1,), {"kind": "elastic", "stiffness": "nan"}, "has stiffness = 'nan'"),
     ((ALONG_1,), {"kind": "elastic", "stiffness": 1, "pretension": -1}, "has pretension -1.0; required >= 0"),
+    (
+        (ALONG_1,),
+        {"kind": "elastic", "stiffness": 1, "pretension": 3, "strongest": 2},
+        "pretension 3.0 N.* at most strongest, 2.0",
+    ),
     ((ALONG_1,), {"kind": "length", "shortest": 1, "longest": 0.5}, "is shortest at 1.0 and longest at 0.5 m"),
     ((ALONG_1,), {"kind": "tension", "weakest": 2, "strongest": 1}, "is weakest at 2.0 and strongest at 1.0 N"),
     ((ALONG_1,), {"kind": "tension", "rest_length": 0}, "has rest_length 0.0"),

@@ -103,6 +103,10 @@ def _actuator(
     _check_limits(where, tag.shortest, tag.longest)
     if not tag.weakest < tag.strongest:
         raise DescriptionError(f"{where} is weakest at {tag.weakest} and strongest at {tag.strongest} N")
+    if tag.pretension > tag.strongest:
+        raise DescriptionError(
+            f"{where} has pretension {tag.pretension} N at rest; required at most strongest, {tag.strongest} N"
+        )
     return tag
 
 

@@ -239,7 +239,7 @@ class ContinuumArm(XacroRobot):
         return questioned_angles(name, tuple(azimuths.tolist()))
 
     def _check_actuators(self) -> None:
-        """Refuse parameters of actuators that have no effect, and a least tension above the largest."""
+        """Refuse parameters of actuators that have no effect, and a least tension or a pretension above the largest."""
         prefix, facts = f"{self.ACTUATOR}_", facts_of(self)
         if self.chain == "flexures" and self.n_actuators:
             raise ParameterError(
@@ -261,3 +261,7 @@ class ContinuumArm(XacroRobot):
             low >= high for low, high in zip(self.by_actuator(least), self.by_actuator(most), strict=True)
         ):
             raise ParameterError(least, getattr(self, least), f"below {most}, {self._each(most)} N")
+        pretension = f"{prefix}pretension"
+        rows = zip(self.actuator_segments, self.by_actuator(pretension), self.by_actuator(most), strict=True)
+        if any(self.kind[segment] == "elastic" and at_rest > largest for segment, at_rest, largest in rows):
+            raise ParameterError(pretension, getattr(self, pretension), f"at most {most}, {self._each(most)} N")
