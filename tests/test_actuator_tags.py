@@ -50,10 +50,10 @@ def test_what_is_not_stated_has_its_default() -> None:
 
 
 def test_the_rest_length_of_a_winding_route_is_that_of_its_curve() -> None:
-    """A cone and a helix in one table, of which a part is outside of the segment, by SciPy's quadrature."""
-    table = '<softrobots:route segment="1" at="-0.1 0.1 0.5" distance="0.01 0.03 0.03" azimuth="0 0 6"/>'
-    cone = 0.1 * math.hypot(1.0, 0.02 / 0.2)
-    helix = quad(lambda _: math.hypot(1.0, 0.03 * 6 / 0.4), 0.1, 0.4)[0]
+    """A cone and a helix in one table, by SciPy's quadrature."""
+    table = '<softrobots:route segment="1" at="0 0.1 0.4" distance="0.02 0.03 0.03" azimuth="0 0 4.5"/>'
+    cone = 0.1 * math.hypot(1.0, 0.01 / 0.1)
+    helix = quad(lambda _: math.hypot(1.0, 0.03 * 4.5 / 0.3), 0.1, 0.4)[0]
     assert one(table, kind="length").rest_length == pytest.approx(cone + helix, rel=1e-14)
     assert not one(table, kind="length").straight
 
@@ -78,6 +78,11 @@ REFUSED = [
     ((ALONG_1,), {"kind": "elastic", "stiffness": 0}, "has stiffness 0.0; a positive number"),
     ((ALONG_1,), {"kind": "elastic", "stiffness": "nan"}, "has stiffness = 'nan'"),
     ((ALONG_1,), {"kind": "elastic", "stiffness": 1, "pretension": -1}, "has pretension -1.0; required >= 0"),
+    (
+        (ALONG_1,),
+        {"kind": "elastic", "stiffness": 1, "pretension": 3, "strongest": 2},
+        "pretension 3.0 N.* at most strongest, 2.0",
+    ),
     ((ALONG_1,), {"kind": "length", "shortest": 1, "longest": 0.5}, "is shortest at 1.0 and longest at 0.5 m"),
     ((ALONG_1,), {"kind": "tension", "weakest": 2, "strongest": 1}, "is weakest at 2.0 and strongest at 1.0 N"),
     ((ALONG_1,), {"kind": "tension", "rest_length": 0}, "has rest_length 0.0"),
@@ -91,6 +96,8 @@ REFUSED = [
     ((ALONG_1.replace("0.03 0.03", "0.03 -0.03"),), {"kind": "tension"}, "has distance -0.03; required >= 0"),
     ((ALONG_1.replace('"0 0.4"', '"0.4 0.5"'),), {"kind": "tension"}, "outside of segment 1, which is 0.4 m long"),
     ((ALONG_1.replace('"0 0.4"', '"-1 0"'),), {"kind": "tension"}, "runs from -1.0 to 0.0 m, outside of segment 1"),
+    ((ALONG_1.replace('"0 0.4"', '"0 0.6"'),), {"kind": "tension"}, "runs from 0.0 to 0.6 m, outside of segment 1"),
+    ((ALONG_1.replace('"0 0.4"', '"-0.1 0.4"'),), {"kind": "tension"}, "runs from -0.1 to 0.4 m, outside of segment 1"),
     ((ALONG_2, ALONG_1), {"kind": "tension"}, "ends at 0.3 m of segment 2.*goes on at 0.0 m of segment 1"),
     ((ALONG_1, ALONG_1), {"kind": "tension"}, "must begin where the one before ends"),
     ((ALONG_1.replace("0.4", "0.3"), ALONG_2), {"kind": "tension"}, "ends at 0.3 m of segment 1, which is 0.4 m long"),

@@ -315,12 +315,16 @@ def test_bad_routes_are_refused(fields: dict[str, Any], field: str) -> None:
 
 FITS = sr.Route(at=(0.0, 0.1), azimuth=0.0, distance=0.004)
 FAR = sr.Route(at=(0.0, 1.1), azimuth=0.0, distance=0.004)
+SHORT = sr.Route(at=(1.048 - 1e-11, 1.048), azimuth=0.0, distance=0.004)
 
 
 @each_row(
     ("kind", "parameters", "field"),
     [
-        *((sr.PccArm, {"routing": value}, "routing") for value in ("tip", 0, 3, True, None, [], ["base"], ("base", 3), [FAR])),
+        *(
+            (sr.PccArm, {"routing": value}, "routing")
+            for value in ("tip", 0, 3, True, None, [], ["base"], ("base", 3), [FAR], [SHORT])
+        ),
         *(
             (sr.PccArm, {"routing": value}, "routing")
             for value in (b"base", math.nan, [FITS, "base"], [{"at": (0, 1)}], {"at": 1}, [{1: 2, "at": 3}])
@@ -345,6 +349,8 @@ FAR = sr.Route(at=(0.0, 1.1), azimuth=0.0, distance=0.004)
         (sr.PccArm, {"kind": "mckibben", "muscle_diameter": math.nan}, "muscle_diameter"),
         (sr.PccArm, {"kind": "mckibben", "muscle_braid_angle": 0.96}, "muscle_braid_angle"),
         (sr.PccArm, {"muscle_least_tension": 400.0}, "muscle_least_tension"),
+        (sr.PccArm, {"kind": "elastic", "muscle_force": 9.0}, "muscle_pretension"),
+        (sr.TendonArm, {"tendon_pretension": (2.0, 2.0, 100.0)}, "tendon_pretension"),
         (sr.PccArm, {"muscle_stiffness": 5e3}, "muscle_stiffness"),
         (sr.PccArm, {"kind": "tension", "muscle_pretension": 5.0}, "muscle_pretension"),
         (sr.PccArm, {"kind": "elastic", "muscle_area": 1e-4}, "muscle_area"),
@@ -401,6 +407,7 @@ def test_bad_parameters_of_actuators_are_refused(kind: type, parameters: dict[st
         ("pcc_arm", {"muscle_least_tension": "400"}, "muscle_least_tension .* required below muscle_force"),
         ("tendon_arm", {"kind": "pressure"}, "kind = pressure : one of"),
         ("tendon_arm", {"tendon_least_tension": "60"}, "tendon_least_tension .* required below tendon_force"),
+        ("tendon_arm", {"tendon_pretension": "100"}, "pretension = .* required at most force"),
         ("tendon_arm", {"tendon_contraction": "1"}, "tendon_contraction .* required < 1"),
         ("tendon_arm", {"poisson_ratio": "0.6"}, "poisson_ratio .* required <="),
         ("tendon_arm", {"bending_stiffness": "0"}, "bending_stiffness .* required > 0"),

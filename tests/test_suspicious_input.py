@@ -51,6 +51,8 @@ def test_what_is_within_the_limits_is_not_asked_and_the_same_in_degrees_is(angle
             ARM.checked_motors(degrees)
 
 
+FAR_OUT = sr.Route(at=(0, 0.06), azimuth=0, distance=4.5)
+
 CASES: list[tuple[Callable[[], Any], str]] = [
     (lambda: sr.solve_equilibrium(ARM, (17, 34, -46)), "motor_1 = 17 rad is 974 degrees; it looks like degrees (did you mean "),
     (lambda: sr.solve_equilibrium(ARM, dict.fromkeys(ARM.actuator_names, 40)), "radians(40) = 0.6981"),
@@ -63,6 +65,13 @@ CASES: list[tuple[Callable[[], Any], str]] = [
     ),
     (lambda: sr.InflatableArm(young_modulus=138), "young_modulus = 138 Pa is next to nothing"),
     (lambda: sr.TendonArm(tendon_distance=(4.5, 4.5, 4.5), radius=0.006), "tendon_distance = 4.5 m is 1e+03 times the usual"),
+    (
+        lambda: sr.TendonArm(tendon_azimuths=(0, 120, 240)),
+        "tendon_azimuths = 240 rad is 1.375e+04 degrees; it looks like degrees",
+    ),
+    (lambda: sr.TendonArm(offset=60), "offset = 60 rad is 3438 degrees"),
+    (lambda: sr.Route(at=(0, 0.06), azimuth=(0, 270), distance=0.0045), "azimuth = 270 rad is 1.547e+04 degrees"),
+    (lambda: sr.TendonArm(kind="tension", routing=[FAR_OUT]), "distance of a route = 4.5 m is 1e+03 times the usual 0.0045 m"),
     (lambda: arc_from_muscles([50, 53, 55], 0.04), "72.65 rad, 11.6 turns: are lengths and distance in m?"),
 ]
 
@@ -105,6 +114,7 @@ def test_many_cases_are_asked_about_once_and_as_a_whole(call: Callable[[], Any])
         ),  # turns without limits
         lambda: sr.InflatableArm(link_lengths=(5.0,), hinge_offset=0.1, radius=0.5, wall_thickness=0.001, stiffness=1e4),
         lambda: MUSCLES.checked_motors([1.2] * 6),
+        lambda: sr.Route(at=(0, 0.06), azimuth=(0.0, 12.0 * math.pi), distance=0.0045),  # six times around
         lambda: arc_from_muscles([0.3, 0.5, 0.5], 0.04),
     ],
 )

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 import numpy as np
@@ -120,6 +120,66 @@ def test_least_tensions_are_those_of_scipy(seed: int) -> None:
     assert np.linalg.norm(found) <= (1.0 + 1e-5) * np.linalg.norm(least.x)
 
 
+def least_of_six(kind: str, target: np.ndarray, force: tuple[float, ...] | None = None) -> sr.IkSolution:
+    arm = sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.0625), elastic_sections=2, kind=kind))
+    return sr.solve_ik(arm, target, force, gravity=DOWN)
+
+
+def test_given_lengths_find_the_tensions_that_given_tensions_find() -> None:
+    """The set of tensions that hold a tip is the same, whatever is given; both searches end at steps of 1e-6 of the scale."""
+    target = np.array((0.0279773, 0.0004087, 0.118221))
+    held, pulled = (least_of_six(kind, target, (0.05, 0.02, -0.03)) for kind in ("length", "tension"))
+    assert held.equilibrium.stable
+    assert held.equilibrium.within_limits
+    assert held.error <= 1e-9
+    assert np.abs(held.equilibrium.muscle_forces - pulled.equilibrium.muscle_forces).max() <= 1e-4
+    compiled = sr.compile(held.equilibrium.model).inverse_kinematics(target, (0.05, 0.02, -0.03), gravity=DOWN)
+    assert np.abs(compiled.q_motors[0] - held.q_motors).max() <= 1e-8
+
+
+@pytest.mark.study
+def test_given_lengths_need_no_more_than_tensions_known_to_suffice(rng: np.random.Generator) -> None:
+    """Tips held with some tendons slack: neither more than given tensions find, nor than those that made the tip."""
+    for _ in range(40):
+        tensions = rng.uniform(0.0, 3.0, 6) * (rng.uniform(size=6) < 0.6)
+        free = sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.0625), elastic_sections=2, kind="tension"))
+        target = sr.solve_equilibrium(free, tensions, gravity=DOWN).tip_position
+        held, pulled = (least_of_six(kind, target) for kind in ("length", "tension"))
+        size = np.linalg.norm(held.equilibrium.muscle_forces)
+        assert held.equilibrium.within_limits
+        assert held.error <= 1e-9
+        assert size <= 1.0001 * np.linalg.norm(pulled.equilibrium.muscle_forces) + 1e-5
+        assert size <= 1.0001 * np.linalg.norm(tensions) + 1e-5
+
+
+@pytest.mark.parametrize("kind", ["length", "elastic"])
+def test_a_workspace_has_only_what_tendons_can_hold(kind: str) -> None:
+    """Every sample, solved again, is within all limits: none pushes; the others are counted as refused."""
+    arm = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1, kind=kind))
+    sampled = sr.sample_workspace(arm, 20, gravity=DOWN)
+    assert 4 <= len(sampled.q_motors) == 20 - sampled.refused
+    for motors, springs, tip in zip(sampled.q_motors, sampled.q_springs, sampled.tip_positions, strict=True):
+        again = sr.solve_equilibrium(arm, motors, gravity=DOWN, q_springs0=springs)
+        assert again.within_limits
+        assert again.stable
+        assert np.abs(again.tip_position - tip).max() <= 1e-9  # as the residual leaves it
+
+
+@pytest.mark.parametrize(
+    ("robot", "height"),
+    [
+        (sr.PccArm(kind="elastic"), 1.048),
+        (sr.PccArm(kind="elastic", routing="base"), 1.048),
+        (sr.PccArm(kind="elastic", segment_lengths=(0.3,)), 0.3),
+    ],
+)
+def test_tips_that_only_slack_tendons_leave_alone_are_reached(robot: sr.PccArm, height: float) -> None:
+    """The straight arm at rest length: its pretension shortens it, so that all tendons hang slack there, to 1e-9 m."""
+    found = sr.solve_ik(sr.load_model(robot), (0.0, 0.0, height))
+    assert found.error <= 1e-9
+    assert found.equilibrium.muscle_forces.max() <= 1e-4  # N; EA over a metre times 1e-9 m
+
+
 @pytest.mark.study
 @pytest.mark.parametrize("name", ["elastic", "tension", "length"])
 def test_poses_and_directions_are_reached_with_nine_tendons(name: str, rng: np.random.Generator) -> None:
@@ -204,6 +264,29 @@ def test_slack_tendons_feel_nothing(rng: np.random.Generator) -> None:
     found = sr.estimate_load(arm, motors, under.muscle_forces, restart=False)
     assert len(found.unobservable_directions) >= 1
     assert found.singular_values[2] == 0.0
+
+
+@pytest.mark.parametrize("robot", [sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1), ROBOTS["mckibben"]])
+def test_what_only_pulls_has_no_tension_below_zero(robot: Any) -> None:
+    """Before a search, in both solvers; noise of a known size may be below zero."""
+    arm = sr.load_model(robot)
+    tensions = np.full(arm.n_motors, 5.0)
+    tensions[1] = -1.0
+    for call in (sr.compile(arm, backend="python").estimate_load, partial(sr.estimate_load, arm)):
+        with pytest.raises(sr.ParameterError, match=rf"0 or above, within 5 torque_std, of {arm.motor_joints[1]}, "):
+            call(arm.relaxed_motors, tensions)
+    free = sr.solve_equilibrium(arm, arm.relaxed_motors)
+    noise = np.where(np.arange(arm.n_motors) == 1, -0.1 - free.muscle_forces, 0.0)
+    found = sr.estimate_load(
+        arm, arm.relaxed_motors, free.muscle_forces + noise, torque_std=100.0, restart=False, max_iterations=5
+    )
+    assert found.measured_torques[1] == pytest.approx(-0.1, rel=1e-12)
+
+
+def test_tensions_are_told_in_newtons() -> None:
+    arm = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1))
+    with pytest.raises(sr.LoadNotFound, match=r"\] by 'newton' in \d+ iterations: [\d.]+ N remain$"):
+        sr.estimate_load(arm, arm.relaxed_motors, (1e3, 1.0, 1.0), restart=False, max_iterations=5)
 
 
 @pytest.mark.parametrize("name", ["tension", "pressure"])

@@ -103,6 +103,10 @@ def _actuator(
     _check_limits(where, tag.shortest, tag.longest)
     if not tag.weakest < tag.strongest:
         raise DescriptionError(f"{where} is weakest at {tag.weakest} and strongest at {tag.strongest} N")
+    if tag.pretension > tag.strongest:
+        raise DescriptionError(
+            f"{where} has pretension {tag.pretension} N at rest; required at most strongest, {tag.strongest} N"
+        )
     return tag
 
 
@@ -118,9 +122,10 @@ def _piece(element: ElementTree.Element, where: str, lengths: Mapping[int, float
         raise DescriptionError(f"{where} has at = {' '.join(map(str, at))[:100]}; ascending places are required")
     if min(distance) < 0.0:
         raise DescriptionError(f"{where} has distance {min(distance)}; required >= 0 m")
-    if at[0] > lengths[segment] - _TOUCHING or at[-1] < _TOUCHING:
+    end = lengths[segment]
+    if not (-_TOUCHING <= at[0] < end - _TOUCHING and _TOUCHING < at[-1] <= end + _TOUCHING):
         raise DescriptionError(
-            f"{where} runs from {at[0]} to {at[-1]} m, outside of segment {segment}, which is {lengths[segment]:.9g} m long"
+            f"{where} runs from {at[0]} to {at[-1]} m, outside of segment {segment}, which is {end:.9g} m long"
         )
     return RouteTag(segment=segment, at=at, distance=distance, azimuth=azimuth)
 

@@ -88,6 +88,12 @@ class ActuatorLaws:
         taut[places] = np.where(inputs[places] > knee - 1e-2 * little, knee - little, inputs[places])
         return taut
 
+    def pushed(self, tensions: FloatArray) -> list[str]:
+        """Return the names of those that push with these tensions, shape (n_muscles,) [N], but go slack instead."""
+        never = tensions < -1e-9 * float(np.abs(tensions).max())  # rounding
+        kinds = zip(self._names, self.kinds, never, strict=True)
+        return [name for name, kind, negative in kinds if negative and kind in ("elastic", "mckibben")]
+
     def refusal(self, inputs: FloatArray) -> str | None:
         """Return the requirement that inputs fail; None if there is none."""
         places = self._of.get("elastic", np.zeros(0, dtype=np.intp))

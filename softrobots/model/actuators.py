@@ -27,7 +27,7 @@ from softrobots.model.actuator_laws import (
 )
 from softrobots.model.muscle_lengths import MuscleLengths
 
-_TAUT = 1e-7  # tension of a tendon that is just taut, relative to what is worth a radian
+_TAUT = 1e-9  # tension of a tendon that is just taut, relative to what is worth a radian: it hardly moves a tip
 _BEYOND = 2.5  # times the limit of an angle, from which on it is hardly in rad
 _MOST_DEGREES = 3.6e4  # a hundred turns, beyond which a number is something else
 _FAR = 30.0  # times the limit of a slide, from which on it is hardly in m
@@ -125,8 +125,7 @@ class Actuators:
     @cached_property
     def described_loads(self) -> tuple[str, ...]:
         """Name of each and the unit of its load, e.g. "motor_1 [N m]"."""
-        rows = zip(self.names, load_units(self.units), strict=True)
-        return tuple(f"{name} [{unit}]" for name, unit in rows) or ("the robot has no actuators",)
+        return tuple(map("{} [{}]".format, self.names, load_units(self.units))) or ("the robot has no actuators",)
 
     def in_order(self, values: Any, field: str) -> Any:
         """Return values by name of actuator in the order of the actuators; anything else as it came.
@@ -192,32 +191,41 @@ class Actuators:
             raise ParameterError(field, motors, requirement)
         return motors
 
-    def checked_loads(self, value: Any, field: str) -> FloatArray:
+    @property
+    def load_unit(self) -> str:
+        """Unit of their loads: "N m", "N" or "N m or N"."""
+        return " or ".join(dict.fromkeys(load_units(self.units)))
+
+    def checked_loads(self, value: Any, field: str, std: Any = None) -> FloatArray:
         """Return loads of the actuators, given in order or by name, as a new array, shape (n_motors,) [N m or N].
 
         Raises:
-            ParameterError: If the shape differs, a name is missing, or a number is not finite; lists the actuators.
+            ParameterError: If the shape differs, a name is missing, a number is not finite, or an actuator that only pulls
+                pushes by more than five times `std`, shape (n_motors,) [N m or N] or None; lists the actuators.
             NameNotFound: If there is no actuator of a name.
         """
-        return finite_array(field, self.in_order(value, field), (len(self.names),), self.described_loads)
+        loads = finite_array(field, self.in_order(value, field), (len(self.names),), self.described_loads)
+        at_most = loads if std is None else loads + 5.0 * std
+        pushed = [] if self._laws is None else self._laws.pushed(at_most[self.n_placed :])
+        if pushed:
+            raise ParameterError(field, loads, f"0 or above, within 5 torque_std, of {', '.join(pushed)}, which only pull")
+        return loads
 
     def _refusal(self, motors: FloatArray) -> str | None:
         if self._lengths is not None:
             return self._lengths.refusal(motors)
-        return None if self._laws is None else self._laws.refusal(motors[len(motors) - len(self._laws.kinds) :])
+        return None if self._laws is None else self._laws.refusal(motors[self.n_placed :])
 
     def admit(self, motors: FloatArray) -> bool:
         """Return whether the robot can have these positions, shape (n_motors,)."""
         return self._refusal(motors) is None
 
     def draw(self, random: np.random.Generator) -> FloatArray | None:
-        """Draw positions uniformly within the limits, shape (n_motors,).
+        """Draw positions uniformly within the limits, shape (n_motors,); None if the robot cannot have them.
 
-        Without a limit it is half a turn, or what is worth that, from the relaxed position. Muscle lengths are projected to
-        consistent ones. None if the robot cannot have the result.
+        Without a limit it is half a turn, or what is worth that, from the relaxed position. Muscle lengths are made consistent.
         """
-        low, high = self.limits.T
-        far = np.pi * self.scale
+        (low, high), far = self.limits.T, np.pi * self.scale
         sample = random.uniform(
             np.where(np.isfinite(low), low, self.relaxed - far), np.where(np.isfinite(high), high, self.relaxed + far)
         )
@@ -251,9 +259,8 @@ class Actuators:
     def active_limits(self, motors: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the limits that are reached: of actuators, and of the range of sections with given muscle lengths.
 
-        Returns:
-            Outward normals, and rows whose outer products are the second derivatives of the limited quantities (zero for
-            actuators), each shape (n, n_motors).
+        Outward normals, and rows whose outer products are the second derivatives of the limited quantities (zero for
+        actuators), each shape (n, n_motors).
         """
         low, high = self.limits.T
         slack, units = 1e-12 * self.scale, np.diag(1.0 / self.scale)

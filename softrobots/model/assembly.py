@@ -17,7 +17,7 @@ from softrobots.model.actuators import Actuators
 from softrobots.model.chain_reader import chain_length
 from softrobots.model.coordinates import Coordinates, DirectCoordinates, SectionCoordinates, rest_coordinates
 from softrobots.model.dry_friction import DryFriction
-from softrobots.model.friction_coordinates import FrictionCoordinates
+from softrobots.model.friction_coordinates import FrictionCoordinates, grip_of, memory_of, remembering
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscle_paths import MusclePaths
 from softrobots.model.muscles import MuscleForces
@@ -171,7 +171,14 @@ def _worth(tags: Sequence[ActuatorTag], rows: Sequence[SectionRow], paths: Muscl
     return np.stack([reeled / bend, bend], axis=1)
 
 
-def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
+def with_given_forces(model: SoftModel) -> SoftModel:
+    """Return a robot of which the muscles of given lengths are given the tensions, with what dry friction remembers."""
+    springs = {name: SpringTag(*pair) for name, pair in model.spring_table.items()}
+    pulled = reassemble(model, springs, muscle_input="forces")
+    return pulled if model.structure.friction is None else remembering(pulled, memory_of(model), grip_of(model))
+
+
+def reassemble(model: SoftModel, springs: Mapping[str, SpringTag], muscle_input: str | None = None) -> SoftModel:
     """Build a model again with another spring at each of its spring joints.
 
     Pinocchio's model and workspace are shared. Only muscles need more than the springs: the free coordinates of given lengths
@@ -180,6 +187,7 @@ def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
     Args:
         model: The model.
         springs: Springs by joint name.
+        muscle_input: As for `assemble`; None: as it is.
 
     Raises:
         DescriptionError: If the springs of an inflated link cannot have a largest moment.
@@ -193,7 +201,7 @@ def reassemble(model: SoftModel, springs: Mapping[str, SpringTag]) -> SoftModel:
             springs=springs,
             motors=structure.motor_joints,
             tip=model.tip,
-            muscle_input=model.muscle_input,
+            muscle_input=muscle_input or model.muscle_input,
             locked=structure.locked_joints,
             like=model,
             robot=model.robot,

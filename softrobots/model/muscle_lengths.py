@@ -108,6 +108,10 @@ class MuscleLengths:
         """Elastic coordinates of the robot without muscles at given motors, lengths and free coordinates."""
         return self._solve(motors, elastic)[1]
 
+    def held(self, motors: FloatArray, strains: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return actuators and free coordinates, shapes (n_motors,) and (n,), at motors without muscles and strains."""
+        return np.concatenate([motors, self.paths.rest + self.paths.at(strains).change]), self.elastic @ strains
+
     def strains_of_many(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """The same, shape (N, count), of N rows of motors and free coordinates in which lengths are met without a fold."""
         given = (motors[:, -len(self._tags) :] - self.paths.rest) @ self.slopes.T

@@ -12,8 +12,9 @@ import numpy as np
 from softrobots.constant_curvature import muscle_residual
 from softrobots.core.checks import finite_array, finite_number
 from softrobots.core.errors import ParameterError
+from softrobots.core.suspicion import question_length
 from softrobots.description.actuator_reader import NUMBERS
-from softrobots.robots.field_values import numbers
+from softrobots.robots.field_values import numbers, questionable, questioned_angles
 from softrobots.robots.fields import (
     PerPart,
     XacroRobot,
@@ -203,8 +204,8 @@ class ContinuumArm(XacroRobot):
 
     def _checked_offset(self, count: int) -> tuple[float, ...]:
         if isinstance(self.offset, list | tuple) or (isinstance(self.offset, np.ndarray) and self.offset.ndim):
-            return numbers("offset", self.offset, count, "rad", "segments")
-        turn = finite_number("offset", self.offset, "rad")
+            return questioned_angles("offset", numbers("offset", self.offset, count, "rad", "segments"))
+        (turn,) = questioned_angles("offset", (finite_number("offset", self.offset, "rad"),))
         return (0.0, *(turn,) * (count - 1))
 
     def _checked_kinds(self, count: int) -> tuple[str, ...]:
@@ -235,10 +236,10 @@ class ContinuumArm(XacroRobot):
             except ParameterError as error:
                 requirement = "none, or three or more that differ (modulo a turn) and do not all lie close together [rad]"
                 raise ParameterError(name, given, f"{requirement}, for kind = length") from error
-        return tuple(azimuths.tolist())
+        return questioned_angles(name, tuple(azimuths.tolist()))
 
     def _check_actuators(self) -> None:
-        """Refuse parameters of actuators that have no effect, and a least tension above the largest."""
+        """Refuse parameters of actuators that have no effect, and a least tension or a pretension above the largest."""
         prefix, facts = f"{self.ACTUATOR}_", facts_of(self)
         if self.chain == "flexures" and self.n_actuators:
             raise ParameterError(
@@ -251,8 +252,16 @@ class ContinuumArm(XacroRobot):
         if self.routes:
             names = (f"{prefix}azimuths", f"{prefix}azimuth_deviation", f"{prefix}distance")
             refuse_given(self, names, "where routing lists the routes")
+            straight: Any = type(self).__dataclass_fields__[names[-1]]
+            farthest = float(max(np.max(route.distance) for route in self.routes))
+            if questionable(straight, (farthest,)):
+                question_length("distance of a route", farthest, straight.default)
         least, most = f"{prefix}least_tension", f"{prefix}force"
         if getattr(self, least) is not None and any(
             low >= high for low, high in zip(self.by_actuator(least), self.by_actuator(most), strict=True)
         ):
             raise ParameterError(least, getattr(self, least), f"below {most}, {self._each(most)} N")
+        pretension = f"{prefix}pretension"
+        rows = zip(self.actuator_segments, self.by_actuator(pretension), self.by_actuator(most), strict=True)
+        if any(self.kind[segment] == "elastic" and at_rest > largest for segment, at_rest, largest in rows):
+            raise ParameterError(pretension, getattr(self, pretension), f"at most {most}, {self._each(most)} N")

@@ -75,6 +75,17 @@ def within(field: Field[Any], values: tuple[float, ...]) -> tuple[float, ...]:
     return values
 
 
+def questioned_angles(name: str, angles: tuple[float, ...], *, winding: bool = False) -> tuple[float, ...]:
+    """Return angles [rad] as they are; ask about the largest if it looks like degrees.
+
+    Of angles that may wind many times around only whole numbers do, as degrees are typed.
+    """
+    largest = max(angles, key=abs, default=0.0)
+    if abs(largest) > _TURNS and (not winding or largest == round(largest)):
+        question_angle(name, largest)
+    return angles
+
+
 def questionable(field: Field[Any], values: Sequence[float]) -> bool:
     """Return whether the largest of some numbers of a field looks as if it were in another unit."""
     largest, unit, usual = max(values, key=abs, default=0.0), field.metadata["facts"].unit, _usual(field)

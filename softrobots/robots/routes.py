@@ -11,7 +11,7 @@ import numpy as np
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.core.field_help import FieldHelp
-from softrobots.robots.field_values import numbers
+from softrobots.robots.field_values import numbers, questioned_angles
 from softrobots.robots.fields import PerPart, argument_text
 
 ROUTINGS = ("segment", "base")
@@ -50,7 +50,7 @@ class Route(FieldHelp):
         if not 2 <= len(at) <= MOST_PLACES or at[0] < 0.0 or np.any(np.diff(at) <= 0.0):
             requirement = f"two positions or more, at most {MOST_PLACES}, ascending from 0 or above [m]"
             raise ParameterError("at", self.at, requirement)
-        azimuth = numbers("azimuth", self.azimuth, len(at), "rad", "positions")
+        azimuth = questioned_angles("azimuth", numbers("azimuth", self.azimuth, len(at), "rad", "positions"), winding=True)
         distance = numbers("distance", self.distance, len(at), "m", "positions")
         if min(distance) <= 0.0:
             raise ParameterError("distance", self.distance, "above 0 [m]")
@@ -74,7 +74,7 @@ def checked_routing(value: Any, lengths: Sequence[float]) -> Routing:
         One word or number a segment, or routes.
 
     Raises:
-        ParameterError: If it is neither, a segment is behind its actuators, or a route ends behind the tip.
+        ParameterError: If it is neither, a segment is behind its actuators, or a route ends behind the tip or where it begins.
     """
     plain = value.tolist() if isinstance(value, np.ndarray | np.generic) else value
     items = (plain,) * len(lengths) if isinstance(plain, str | int) else plain
@@ -106,6 +106,9 @@ def _route(item: Any, value: Any, length: float, count: int) -> Route:
     if route.at[-1] > (1.0 + _BEYOND) * length or count > MOST_PLACES:
         requirement = f"at most {MOST_PLACES} routes that end within the length of the robot, {length} m"
         raise ParameterError("routing", value, requirement)
+    least = 2.0 * _BEYOND * length  # so that a part of it is longer than the tolerance in the segments on both sides
+    if route.at[-1] - route.at[0] <= least:
+        raise ParameterError("routing", value, f"routes with `at` that spans more than {least:.3g} m; one has {route.at}")
     return route
 
 

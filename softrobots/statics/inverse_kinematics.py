@@ -47,7 +47,7 @@ class IkSolution(Summarised):
     orientation_error: float
     """Angle between the tip and its target orientation [rad]; 0 without one."""
     iterations: int
-    """Steps from the start of the search."""
+    """Steps from the start of the search; of redundant tendons of given length those after the search among tensions."""
     alternatives: tuple[FloatArray, ...]
     """Actuator coordinates of the other solutions found, each shape (n_motors,), by their distance from the start; whole turns
     of a motor count as the same solution."""
@@ -107,7 +107,7 @@ def solve_ik(
     the change is minimal; if it has muscles, the first search that succeeds decides, as it does among obstacles. Where
     muscles cannot both pull and push (a least tension of zero or more), the limits of all tensions are kept, too, and
     redundant ones get the least tension instead: a minimum of the sum of squares beyond their pretension
-    (`statics.tip_steps`).
+    (`statics.tip_steps`), also where lengths are given (`statics.tip_goal.LoadedTip.begin`).
 
     For full poses of a robot with a spherical wrist the arm first puts the centre of the wrist in place, and the wrist starts
     in the orientation, with both of its solutions (`statics.spherical_wrist`).
@@ -164,7 +164,7 @@ def solve_ik(
     wrist = spherical_wrist(model) if goal.rows == 6 else None
     for tried in [begins] if wrist is None else [[first, *wrist.starts(tip, begins)], begins[1:]]:
         for start in tried:
-            local = search(tip, start, model.rest, home=first, tolerance=tolerance)
+            local = search(tip, *tip.begin(start, model.rest, tolerance), home=first, tolerance=tolerance)
             if local is not None:
                 ended.append(local)
                 if first_decides and local.arrived(tolerance) and allowed(local):

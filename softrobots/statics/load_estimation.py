@@ -164,8 +164,8 @@ def estimate_load(
         The force with conditioning, unobservable directions, covariance and alternatives.
 
     Raises:
-        ParameterError: If an argument has the wrong shape, is not finite or out of range, the robot has no motors, none of them
-            feels a load, or it has muscles and `stiffness_std` is given.
+        ParameterError: If an argument has the wrong shape, is not finite or out of range, a tendon that only pulls pushes, the
+            robot has no motors, none of them feels a load, or it has muscles and `stiffness_std` is given.
         NameNotFound: If the frame does not exist.
         LoadNotFound: If no force explains the torques; carries the best estimate.
         NeutralEquilibrium: If the search meets a load at which the tangent stiffness is singular.
@@ -176,23 +176,23 @@ def estimate_load(
     instance_of("restart", restart, bool, "True or False")
     check_feels(model)
     motors = model.checked_motors(q_motors)
-    torques = model.actuators.checked_loads(motor_torques, "motor_torques")
     errors = MeasurementErrors.of(model, torque_std, stiffness_std, motor_angle_std)
+    torques = model.actuators.checked_loads(motor_torques, "motor_torques", errors.torque_std)
     at = model.tip if frame is None else frame
     span = _span(directions)
     if method == "alternation" and directions is not None:
         raise ParameterError("directions", directions, "None for 'alternation', which finds forces of any direction")
     base = Load.of(model, frame=at, gravity=gravity, environment=environment)
-    most = 100 if method == "newton" else 1000
-    most = most if max_iterations is None else positive_integer("max_iterations", max_iterations)
+    usual = 100 if method == "newton" else 1000
+    most = positive_integer("max_iterations", usual if max_iterations is None else max_iterations)
     model, start = from_before(model, previous)
     problem = MeasuredTorques(model, motors, torques, base, at, errors, span, start)
     best, *others = SOLVERS[method](problem, most, restart=restart)
     result = _estimate(problem, best, method, others)
     if not (problem.explained(best) and result.equilibrium.converged):
         raise LoadNotFound(
-            f"no force explains the motor torques {torques.tolist()} N m by {method!r} in {result.iterations} iterations: "
-            f"{result.residual:.3g} N m remain",
+            f"no force explains the motor torques {torques.tolist()} by {method!r} in {result.iterations} iterations: "
+            f"{result.residual:.3g} {model.actuators.load_unit} remain",
             best=result,
             residual=result.residual,
             iterations=result.iterations,
@@ -209,8 +209,8 @@ def check_feels(model: SoftModel) -> None:
     if check_model(model).n_motors == 0:
         raise ParameterError("model", model, "a robot with at least one motor")
     if not model.actuators.feels.any():
-        requirement = "a robot with muscles of given length, elastic tendons or McKibben muscles: given forces feel no load"
-        raise ParameterError("model", model, requirement)
+        kinds = "muscles of given length, elastic tendons or McKibben muscles"
+        raise ParameterError("model", model, f"a robot with {kinds}: given forces feel no load")
 
 
 def _span(directions: Any) -> FloatArray:

@@ -11,6 +11,7 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray, finite_array
 from softrobots.core.errors import NeutralEquilibrium, ParameterError
+from softrobots.model.assembly import with_given_forces
 from softrobots.model.friction_coordinates import slipping
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.pressed_gaps import PressedGaps, motor_slopes, pressed_gaps
@@ -19,7 +20,7 @@ from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import inverse_in_contact, tip_motion
-from softrobots.statics.tip_search import LEVER, LocalSolution
+from softrobots.statics.tip_search import LEVER, LocalSolution, search
 from softrobots.statics.tip_steps import Pull, TipModel, pull
 
 _MOST_OPENED = 4  # pressed contacts beyond which each opens alone, or all of them
@@ -161,6 +162,28 @@ class LoadedTip:
             state = elastic_state(slipping(self.model), q_motors, state.q_springs, self.load)
         translation, turn = self.goal.missing(self.model, state.q)
         return LocalSolution(q_motors, state, float(np.linalg.norm(translation)), float(np.linalg.norm(turn)), excess)
+
+    def begin(self, q_motors: FloatArray, start: FloatArray, tolerance: float) -> tuple[FloatArray, FloatArray]:
+        """Return actuators and elastic coordinates to search from, shapes (n_motors,) and (n_springs,).
+
+        Redundant tendons of given length begin at the least tensions near `q_motors` that put the tip at the goal. Which
+        tensions hold a pose does not depend on what is given, and only among tensions their limits are flat: those of given
+        lengths change with the stiffness of the backbone, and a search among lengths creeps along them. Where given tensions
+        find nothing, as where only held lengths are stable, and for all others it is `q_motors` and `start`.
+        """
+        model, actuators, structure = self.model, self.model.actuators, self.model.structure
+        redundant = actuators.least_tension and actuators.basis.shape[1] > self.rows
+        held = self.solve(q_motors, start) if redundant and structure.muscle_lengths else None
+        if held is None or structure.muscle_lengths is None:
+            return q_motors, start
+        pulled, count = with_given_forces(model), len(structure.motor_joints)
+        tensions = np.clip(np.concatenate([q_motors[:count], held.state.load.motors[count:]]), *pulled.motor_limits.T)
+        strains = structure.strains(q_motors, held.state.q_springs)
+        found = search(replace(self, model=pulled), tensions, strains, tolerance=tolerance)
+        if found is None or not found.arrived(tolerance):
+            return q_motors, start
+        motors, elastic = structure.muscle_lengths.held(found.q_motors[:count], found.state.q_springs)
+        return actuators.go(q_motors, motors - q_motors), elastic
 
     def missing(self, state: ElasticState) -> FloatArray:
         """Return the difference from the tip to the goal, shape (3 or 6,), rotations times the lever [m]."""

@@ -22,7 +22,7 @@ POSITION_TOLERANCE = 1e-9
 ANGLE_TOLERANCE = 1e-9
 """Tolerance of the orientation of the tip [rad]."""
 
-TENSION_TOLERANCE = 1e-8
+TENSION_TOLERANCE = 1e-10
 """Tolerance of tension limits, relative to the tension that is worth a radian [-]."""
 
 SAME = 1e-6

@@ -16,9 +16,10 @@ from softrobots.core.npz_file import LARGEST
 from softrobots.core.progress import with_progress
 from softrobots.core.summary import Part, Summarised, Table, facts, field_facts
 from softrobots.environment.environment import Environment
+from softrobots.model.assembly import with_given_forces
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.contact.pressed_gaps import pressed_gaps
-from softrobots.statics.elastic_state import elastic_state, largest_residual
+from softrobots.statics.elastic_state import ElasticState, elastic_state, largest_residual
 from softrobots.statics.elastostatics import balanced_state
 from softrobots.statics.equilibrium_summary import loaded_robot
 from softrobots.statics.kinematics import frame_jacobian, frame_placement
@@ -27,6 +28,7 @@ from softrobots.statics.sensitivity import tip_motion
 from softrobots.statics.stability import is_stable
 from softrobots.version import __version__
 
+_SLACK = 1e-8  # of the limits of tensions, relative to the tension that is worth a radian: rounding of given lengths
 _BLOCK = 250  # samples in one block of a checkpoint
 
 FIELDS = ("q_motors", "q_springs", "tip_positions", "manipulability")
@@ -54,7 +56,7 @@ class Workspace(Summarised):
     `SoftModel.motor_scale` (for muscles: their distance from the backbone). 0: the tip cannot move in some direction.
     """
     refused: int
-    """Number of samples without a shape (inconsistent muscle lengths) or without a stable equilibrium."""
+    """Number of samples without a shape (inconsistent muscle lengths), without a stable equilibrium, or beyond tensions."""
 
     def __repr__(self) -> str:
         """The robot, and how many samples have an equilibrium."""
@@ -86,7 +88,8 @@ def sample_workspace(
     """Sample the positions that the tip can reach.
 
     Actuator coordinates are uniform within their limits (muscle lengths of a segment are projected to consistent ones), with
-    the robot in equilibrium under the load at each.
+    the robot in equilibrium under the load at each. Where muscles cannot both pull and push, only samples within the limits
+    of all tensions count, as for `solve_ik`; with lengths given, tensions are drawn, which hardly any of the lengths has.
 
     Args:
         model: The robot, with at least one actuator.
@@ -103,7 +106,7 @@ def sample_workspace(
         progress: Show a progress bar on stderr; a text is its label.
 
     Returns:
-        The samples that are stable equilibria.
+        The samples that are stable equilibria, within the limits of tensions.
 
     Raises:
         ParameterError: If an argument has the wrong shape or is out of range, the robot has no actuators, no sample is a
@@ -150,6 +153,8 @@ def _identity(model: SoftModel, load: Load, count: int, seed: int) -> dict[str, 
 def _draw(model: SoftModel, load: Load, count: int, seed: int, kept: Checkpoint | None, progress: bool | str) -> dict[str, Any]:
     """All samples, from the blocks of the checkpoint or new; rows that are not stable are zero."""
     samples: dict[str, Any] = {name: np.zeros(shape, kind) for name, (kind, shape) in _arrays(model, count).items()}
+    only_pull = model.structure.muscle_lengths is not None and model.actuators.least_tension
+    pulled = with_given_forces(model) if only_pull else model  # that is drawn
     blocks = [slice(first, min(first + _BLOCK, count)) for first in range(0, count, _BLOCK)]
     missing = np.ones(count, dtype=bool)
     for number, rows in enumerate(blocks):
@@ -163,13 +168,13 @@ def _draw(model: SoftModel, load: Load, count: int, seed: int, kept: Checkpoint 
         """Row and motors of the missing samples; the others are drawn, too, to keep the random sequence."""
         random = np.random.default_rng(seed)
         for row in range(count):
-            motors = model.actuators.draw(random)
+            motors = pulled.actuators.draw(random)
             if missing[row]:
                 yield row, motors
 
     done = count - int(missing.sum())
     for row, motors in with_progress(drawn(), progress, label="samples", unit="sample", total=count, done=done):
-        sample = None if motors is None else _sample(model, load, motors)
+        sample = None if motors is None else _sample(model, load, pulled, motors)
         if sample is not None:
             for name, value in zip(("stable", *FIELDS), (True, *sample), strict=True):
                 samples[name][row] = value
@@ -190,10 +195,17 @@ def _arrays(model: SoftModel, count: int) -> dict[str, tuple[type, tuple[int, ..
     }
 
 
-def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
-    """Motors, springs, tip and manipulability of a sample; None without a stable equilibrium."""
-    state = balanced_state(model, motors, load, model.rest)
-    if state is None or not is_stable(model, load, state):
+def _sample(
+    model: SoftModel, load: Load, pulled: SoftModel, motors: FloatArray
+) -> tuple[FloatArray, FloatArray, FloatArray, float] | None:
+    """Motors, springs, tip and manipulability of a sample of the robot that is drawn; None without a stable equilibrium."""
+    state = balanced_state(pulled, motors, load, pulled.rest)
+    if state is not None and pulled is not model and model.structure.muscle_lengths is not None:
+        motors, start = model.structure.muscle_lengths.held(motors[: -len(model.muscles)], state.q_springs)
+        low, high = model.motor_limits.T
+        allowed = model.actuators.admit(motors) and bool(np.all((motors >= low) & (motors <= high)))
+        state = balanced_state(model, motors, load, start) if allowed else None
+    if state is None or not is_stable(model, load, state) or _overdrawn(model, state):
         return None
     by_motors, by_springs = state.point.columns(frame_jacobian(model, state.q, model.tip)[:3])
     try:
@@ -204,6 +216,13 @@ def _sample(model: SoftModel, load: Load, motors: FloatArray) -> tuple[FloatArra
     tip = np.array(frame_placement(model, state.q, model.tip).translation)
     values = np.linalg.svd(slope, compute_uv=False)
     return motors, state.q_springs, tip, float(np.prod(values)) if len(values) == 3 else 0.0
+
+
+def _overdrawn(model: SoftModel, state: ElasticState) -> bool:
+    """Whether a tension is beyond its limits; never of muscles that both pull and push."""
+    low, high = model.actuators.muscle_forces.T
+    tensions, slack = state.load.motors[model.n_motors - len(low) :], _SLACK * model.actuators.tension_scale
+    return model.actuators.least_tension and bool(np.any((tensions < low - slack) | (tensions > high + slack)))
 
 
 def workspace_at(

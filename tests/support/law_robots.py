@@ -54,7 +54,7 @@ def model(kind: str) -> sr.SoftModel:
         "pulled": lambda: sr.PccArm(elastic_sections=2),
         "pcc_lumped": lambda: sr.PccArm(chain="lumped", hinges=3, offset=np.pi),  # its hinges have two planes of symmetry
         "tendons": lambda: sr.TendonArm(
-            segment_lengths=(0.06, 0.06), elastic_sections=2, tendon_pretension=100.0
+            segment_lengths=(0.06, 0.06), elastic_sections=2, tendon_pretension=100.0, tendon_force=400.0
         ),  # never slack
         "helix": lambda: sr.HelixTube(**tube),
         "helix_left": lambda: sr.HelixTube(**tube, handedness="left"),

@@ -122,8 +122,9 @@ class CompiledModel(CompiledDynamics):
         estimate = CompiledLoadEstimate(w, run.layout, self._actuation, motors, Status(status))
         if status != Status.CERTIFIED:
             raise LoadNotFound(
-                f"no unique force explains the motor torques {torques.tolist()} N m: {Status(status).explanation}; "
-                f"{estimate.unexplained:.3g} N m remain (softrobots.estimate_load returns the unobservable directions)",
+                f"no unique force explains the motor torques {torques.tolist()}: {Status(status).explanation}; "
+                f"{estimate.unexplained:.3g} {self._model.actuators.load_unit} "
+                "remain (softrobots.estimate_load returns the unobservable directions)",
                 best=estimate,
                 residual=estimate.unexplained,
                 iterations=int(w[run.layout.single("iterations")]),

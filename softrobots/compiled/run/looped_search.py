@@ -112,6 +112,7 @@ class LoopedSearch:
         """Find actuators that put the tip within the tolerance [m] of a target, from given ones and elastic coordinates."""
         tip = _SoughtTip(self.model, self, force, gravity, target)
         first = self.model.actuators.go(q_motors, np.zeros(len(q_motors)))  # within the limits
+        first, start = tip.loaded.begin(first, start, tolerance)
         status, state = self.settle(first, force, gravity, start)
         found = search(tip, first, start, tolerance=tolerance) if status == Status.CERTIFIED else None
         if found is None:
@@ -256,7 +257,7 @@ class _SoughtTip:
             return None
         excess = 0.0
         if self.model.actuators.least_tension:
-            pulled = elastic_state(self.model, q_motors, state.q_springs, self._loaded.load)
+            pulled = elastic_state(self.model, q_motors, state.q_springs, self.loaded.load)
             taut, excess = taken_up(self.model, q_motors, pulled)
             if not np.array_equal(taut, q_motors):
                 return self.solve(taut, state.q_springs)
@@ -264,7 +265,7 @@ class _SoughtTip:
         return LocalSolution(q_motors, state, float(np.linalg.norm(self.missing(state))), excess=excess)
 
     @property
-    def _loaded(self) -> LoadedTip:
+    def loaded(self) -> LoadedTip:
         """The same on Pinocchio, for the derivatives of tensions."""
         return LoadedTip(self.model, Goal(self.target), Load.of(self.model, force=self.force, gravity=self.gravity))
 
@@ -277,10 +278,10 @@ class _SoughtTip:
 
     def pull(self, state: ChainState, follow: FloatArray) -> Pull | None:
         """Return the tensions with their derivatives; None of muscles of given length that push."""
-        return None if state.pulled is None else self._loaded.pull(state.pulled, follow)
+        return None if state.pulled is None else self.loaded.pull(state.pulled, follow)
 
     def motion(self, state: ChainState) -> tuple[FloatArray, FloatArray]:
         """Return the Jacobian of the tip, and how the springs follow; zeros without tensions: their first Newton step tells."""
         if state.pulled is not None:
-            return self._loaded.motion(state.pulled)
+            return self.loaded.motion(state.pulled)
         return self.chain.jacobian(state.w), np.zeros((len(state.q_springs), self.model.n_motors))
