@@ -20,7 +20,7 @@ from softrobots.core.errors import ParameterError
 from softrobots.environment.gaps import Surroundings
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_laws import Balance
-from softrobots.statics.contact.coulomb import solve_step
+from softrobots.statics.contact.coulomb import GAP, solve_step
 from softrobots.statics.contact.last_state import MARGIN, Given, Sliding, forces_of
 from softrobots.statics.contact.sliding import SlidingRobot
 from softrobots.statics.equilibrium_result import Equilibrium
@@ -75,11 +75,16 @@ class Rest(NamedTuple):
         return self.robot.equilibrium(self.found, self.iterations)
 
 
-def settle(given: Given, last: Sliding, start: FloatArray, brake: float = 0.0, *, patient: bool = True) -> Rest | None:
-    """Solve one step from elastic coordinates, shape (n_springs,); None if it does not converge to a state that holds."""
+def settle(
+    given: Given, last: Sliding, start: FloatArray, brake: float = 0.0, *, patient: bool = True, forced: float = GAP
+) -> Rest | None:
+    """Solve one step from elastic coordinates, shape (n_springs,); None if it does not converge to a state that holds.
+
+    For `patient` and `forced` see `coulomb.solve_step`.
+    """
     with one_blas_thread(given.model.n_springs):
         robot = SlidingRobot(given, last, brake)
-        found, spent = solve_step(robot, start, last.friction, patient=patient)
+        found, spent = solve_step(robot, start, last.friction, patient=patient, forced=forced)
         if found is None or not robot.holds(found):
             return None
         return Rest(robot, found, robot.work(found), spent)
