@@ -83,7 +83,7 @@ class ContactSearch:
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
         error, apart = state.error / allowed, gap / (_EXACT * self._reach)
         if error <= BALANCED < apart:
-            apart = gap / (_EXACT * self._reach + _ROUNDING * float(np.abs(touch.gaps.transforms).max()))
+            apart = gap / (_EXACT * self._reach + _ROUNDING * float(np.abs(touch.gaps.transforms).max(initial=0.0)))
         return Near(state, touch, max(error, apart), seen, state.residual + touch.forces.dot(touch.rows))
 
     def descend(self, here: Near) -> tuple[Near, bool]:
