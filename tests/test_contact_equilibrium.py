@@ -259,6 +259,15 @@ def test_a_wall_that_is_a_large_ball_is_certified_as_the_wall(arm: sr.SoftModel,
     assert ball.contacts[0].normal_force == pytest.approx(wall.contacts[0].normal_force, rel=10.0 / radius)
 
 
+def test_before_the_tip_a_gap_is_smaller_by_the_radius_of_the_cap(arm: sr.SoftModel) -> None:
+    """A wall 0.3 m before the flat end of the straight arm, and one 0.3 m beside its axis; `capsule_error` has neither."""
+    found = sr.solve_equilibrium(arm, (0, 0, 0))
+    before, beside = HalfSpace((-1, 0, 0), -found.tip_position[0] - 0.3), HalfSpace((0, 0, 1), -0.3)
+    assert found.clearance(Environment([before])).distance == pytest.approx(0.3 - BODY, abs=1e-12)
+    assert found.clearance(Environment([beside])).distance == pytest.approx(0.3 - BODY, abs=1e-12)
+    assert sr.capsule_error(arm, (0, 0, 0)).shape == (0,)
+
+
 def test_three_walls_on_one_end_share_the_load_by_least_norm(one_link: sr.SoftModel) -> None:
     """Three walls through one point and two springs: forces are not unique, and those of least norm are told as such."""
     end, push = end_of(np.zeros(2)), np.array([0.0, 40.0, 70.0])
