@@ -21,6 +21,7 @@ from softrobots.statics.elastic_state import ElasticProblem
 from studies.soak import contact_cases, contact_running
 from tests.support.law_robots import PUSHES, directions, model
 from tests.support.oracles import arm_energy
+from tests.support.planar_robots import joint, robot
 
 MOTORS, FORCE = (0.3, 0.6, -0.8), np.array([0.0, 30.0, -80.0])
 WALLS = {
@@ -184,6 +185,87 @@ def test_spring_pairs_are_one_of_all_active_sets(one_link: sr.SoftModel, seed: i
     assert found.stable
     assert np.abs(found.q_springs - best[2][:2]).max() < 1e-8
     assert pressed == pytest.approx({f"half_space_{1 + i}": f for i, f in zip(best[1], best[2][2:], strict=True)}, rel=1e-7)
+
+
+def test_balls_on_six_springs_are_one_of_all_256_active_sets() -> None:
+    """Two balls on slides among four walls: a convex quadratic programme, whose one solution is found by trying every set.
+
+    Sets that hold have two to four contacts here; gaps and torques are linear, so that only rounding is left.
+    """
+    radius, names = 0.1, ("a", "b", "one", "c", "d", "tip")
+    axes = ("1 0 0", "0 1 0", "0 0 1")
+    places = ('xyz="1 0 1"', "", 'xyz="0 0 -1"', 'xyz="1 0 0"', "", "")  # no ball is where the robot stands
+    stiffness = np.array([100.0, 60.0, 150.0, 80.0, 120.0, 50.0])
+    joints = [
+        joint(f"slide_{i}", "prismatic", parent, child, axes[i % 3], k, places[i])
+        for i, (parent, child, k) in enumerate(zip(("base", *names[:-1]), names, stiffness, strict=True))
+    ]
+    balls = robot(("base", *names), joints, [(name, "0 0 0", "0 0 0", radius) for name in ("one", "tip")])
+    jacobian = np.stack([np.hstack([np.eye(3), np.zeros((3, 3))]), np.hstack([np.eye(3), np.eye(3)])])  # of the centres
+    rest = np.array([[1.0, 0.0, 0.0], [2.0, 0.0, 0.0]])
+    held_sizes = set()
+    for seed in range(12):
+        rng = np.random.default_rng(seed)
+        normals = rng.normal(size=(4, 3))
+        normals /= np.linalg.norm(normals, axis=1)[:, None]
+        offsets = (rest @ normals.T).min(axis=0) - radius - rng.uniform(0.01, 0.1, 4)
+        forces = rng.uniform(-40.0, 40.0, (2, 3)) - 15.0 * normals.sum(axis=0)
+        rows = np.concatenate([normals @ one for one in jacobian])
+        gaps = (rest @ normals.T - offsets - radius).ravel()
+        pull = np.einsum("bij,bi->j", jacobian, forces)
+        held, springs, pressed = min(
+            found for found in (solved(stiffness, pull, rows, gaps, one) for one in subsets(8)) if found is not None
+        )
+        held_sizes.add(len(held))
+        walls = [HalfSpace(tuple(normal), offset) for normal, offset in zip(normals, offsets, strict=True)]
+        loads = {name: (*force, 0, 0, 0) for name, force in zip(("one", "tip"), forces, strict=True)}
+        answer = sr.solve_equilibrium(balls, (), wrench=loads, environment=Environment(walls))
+        assert answer.stable
+        assert answer.q_springs == pytest.approx(springs, abs=1e-9)
+        expected = {(("one", "tip")[i // 4], f"half_space_{1 + i % 4}"): f for i, f in zip(held, pressed, strict=True)}
+        assert {(one.link, one.obstacle): one.normal_force for one in answer.contacts if one.strict} == pytest.approx(
+            expected, rel=1e-7
+        )
+    assert held_sizes >= {3, 4}
+
+
+def subsets(count: int) -> list[tuple[int, ...]]:
+    """All subsets of the first numbers."""
+    return [held for size in range(count + 1) for held in combinations(range(count), size)]
+
+
+def solved(
+    stiffness: np.ndarray, pull: np.ndarray, rows: np.ndarray, gaps: np.ndarray, held: tuple[int, ...]
+) -> tuple[tuple[int, ...], list[float], list[float]] | None:
+    """Springs and forces if exactly the contacts `held` press; None if that does not hold."""
+    chosen, n = rows[list(held)], len(stiffness)
+    matrix = np.block([[np.diag(stiffness), -chosen.T], [chosen, np.zeros((len(held),) * 2)]])
+    if np.linalg.matrix_rank(chosen) < len(held):
+        return None
+    found = np.linalg.solve(matrix, np.concatenate([pull, -gaps[list(held)]]))
+    holds = (gaps + rows @ found[:n]).min() > -1e-12 and found[n:].min(initial=0.0) >= 0.0
+    return (held, found[:n].tolist(), found[n:].tolist()) if holds else None
+
+
+@pytest.mark.parametrize("radius", [1e4, 1e5, 1e6])
+def test_a_wall_that_is_a_large_ball_is_certified_as_the_wall(arm: sr.SoftModel, radius: float) -> None:
+    """Rounding of gaps, 1e-16 of the distance of the centre, says nothing of stability; gaps differ by `l^2 / (2 R)`."""
+    motors, force = (0, 0.9, -0.4), (0, 0, -20)
+    wall = sr.solve_equilibrium(arm, motors, force, environment=Environment([HalfSpace((-1, 0, 0), -1.0)]))
+    ball = sr.solve_equilibrium(arm, motors, force, environment=Environment([Sphere(radius, (radius + 1, 0, 0.6))]))
+    assert wall.stable
+    assert ball.stable
+    assert ball.stability.kind == "stable"
+    assert ball.contacts[0].normal_force == pytest.approx(wall.contacts[0].normal_force, rel=10.0 / radius)
+
+
+def test_before_the_tip_a_gap_is_smaller_by_the_radius_of_the_cap(arm: sr.SoftModel) -> None:
+    """A wall 0.3 m before the flat end of the straight arm, and one 0.3 m beside its axis; `capsule_error` has neither."""
+    found = sr.solve_equilibrium(arm, (0, 0, 0))
+    before, beside = HalfSpace((-1, 0, 0), -found.tip_position[0] - 0.3), HalfSpace((0, 0, 1), -0.3)
+    assert found.clearance(Environment([before])).distance == pytest.approx(0.3 - BODY, abs=1e-12)
+    assert found.clearance(Environment([beside])).distance == pytest.approx(0.3 - BODY, abs=1e-12)
+    assert sr.capsule_error(arm, (0, 0, 0)).shape == (0,)
 
 
 def test_three_walls_on_one_end_share_the_load_by_least_norm(one_link: sr.SoftModel) -> None:

@@ -120,7 +120,7 @@ REFUSED = {
     "pose without a pose": (
         lambda: sr.Environment([sr.Sphere(0.1, pose=lambda t: None)]).at(0.5),
         sr.ParameterError,
-        "pose(0.5) must be",
+        "pose(0.5) of sphere_1 must be",
     ),
     "one obstacle": (lambda: sr.Environment(sr.Sphere(0.1)), sr.ParameterError, "a list of obstacles"),
     "a number": (lambda: sr.Environment([0.1]), sr.ParameterError, "obstacles[0] must be an obstacle"),

@@ -27,10 +27,14 @@ def capsule_error(model: SoftModel, q_motors: Any, q_springs: Any | None = None)
     """Return bounds of the distance between the body of a robot and its capsules, one a section.
 
     No point of the tube around the centre line is farther than that outside of the capsules, and no point of the capsules
-    outside of the tube: no gap to an obstacle differs by more. It is attained along sections of constant strain whose body is
-    around the chain, unless their chord is shorter than half of that at rest. The body of a lumped section, and of one
-    with a flexure, is the arc that touches its two pieces at their ends. At both ends of the chain the capsules have caps, by
-    which they are a radius longer than a tube with flat ends. Straight links are exact between their hinges.
+    outside of the tube: no gap to an obstacle beside the robot differs by more. It is attained along sections of constant
+    strain whose body is around the chain, unless their chord is shorter than half of that at rest. The body of a lumped
+    section, and of one with a flexure, is the arc that touches its two pieces at their ends. Straight links are exact between
+    their hinges.
+
+    At both ends of the chain, beyond the first and the last link, the capsules have caps, by which they are a radius longer
+    than a tube with flat ends. That is not in the bounds: a gap to an obstacle before the tip may be smaller than that of a
+    flat end by a radius more.
 
     Args:
         model: The robot, with the capsules of the descriptions of this package.
@@ -38,7 +42,8 @@ def capsule_error(model: SoftModel, q_motors: Any, q_springs: Any | None = None)
         q_springs: Elastic coordinates, shape (n_springs,) [rad or m]; relaxed by default.
 
     Returns:
-        The bounds, shape (n_sections,) [m], in the order of `model.structure.section_table`; empty without sections.
+        The bounds, shape (n_sections,) [m], in the order of `model.structure.section_table`; empty without sections,
+        as of an arm of straight links.
 
     Raises:
         ParameterError: If `model` is not a `SoftModel`, a shape differs, a number is not finite, or a section is bent or

@@ -68,7 +68,8 @@ class Gaps:
         self.values: FloatArray = found.distances - self.radii
         """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
         self._cores, self.places, self.parts, self._transforms, self.reach = cores, places, found.parts, transforms, reach
-        self._own = own
+        self.with_itself = own
+        """Whether the robot may touch itself."""
         self.moves: FloatArray = cores.moves.take(found.capsules, 0)
         """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
 
@@ -84,6 +85,16 @@ class Gaps:
     def __len__(self) -> int:
         """Number of candidates."""
         return len(self.values)
+
+    @property
+    def transforms(self) -> FloatArray:
+        """Transforms of the obstacles to the world, shape (n, 4, 4)."""
+        return self._transforms
+
+    @property
+    def capsule_radii(self) -> FloatArray:
+        """Radii of all capsules, shape (k,) [m]."""
+        return self._cores.radii
 
     @property
     def points(self) -> FloatArray:

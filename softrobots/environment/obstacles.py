@@ -113,7 +113,7 @@ class Obstacle:
         """
         if not callable(self.pose):
             return self
-        return replace(self, pose=rigid_transform(f"pose({parameter!r})", self.pose(parameter)))
+        return replace(self, pose=rigid_transform(f"pose({parameter!r}) of {self.name or self.kind}", self.pose(parameter)))
 
     def moved(self: Kind, transform: Any) -> Kind:
         """Return the obstacle moved by a rigid transform of the world, a `pinocchio.SE3` or shape (4, 4), on top of its pose.
@@ -165,12 +165,12 @@ class Obstacle:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class HalfSpace(Obstacle):
-    """A wall or floor: the robot is free where `normal . x >= offset`."""
+    """A wall or floor: the robot is free where `normal . x >= offset`, with the unit normal."""
 
     normal: Any
     """Direction out of the wall, shape (3,); made a unit vector."""
     offset: float = 0.0
-    """Distance of the plane from the origin along the normal [m]."""
+    """Distance of the plane from the origin along the unit normal, whatever the length of the one given [m]."""
 
     kind: ClassVar[str] = "half_space"
 

@@ -89,7 +89,7 @@ class ContactWalk:
 
     def _tell(self, before: dict[tuple[str, str], str], after: dict[tuple[str, str], str], parameter: float) -> None:
         """Note which contacts have changed."""
-        for pair in before.keys() | after.keys():
+        for pair in {**before, **after}:
             kind = MADE if pair not in before else after.get(pair, LOST)
             if kind != before.get(pair):
                 self.events.append(ContactEvent(parameter, kind, *pair))

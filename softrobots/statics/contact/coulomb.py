@@ -12,7 +12,7 @@ contact problems prone to Newton like solution methods, Computer Methods in Appl
 4; implicit in time: the friction at the end of the step opposes the sliding in it). Without friction only `y` and
 :math:`\lambda_n` are left. The contacts that press (:math:`\lambda_n > \rho g`) stand in one dense system, which is not
 symmetric; where it is singular (more contacts than the robot has coordinates) the smallest change of forces is taken,
-and sliding that no motion of the springs can prevent (an elbow of rigid links that is turned) is let be, up to `FORCED`.
+and a contact whose sliding no motion of the springs can prevent (an elbow of rigid links that is turned) slips.
 """
 
 from __future__ import annotations
@@ -41,13 +41,12 @@ _MOTIONLESS = 1e-6  # motion of a point that no spring can move, over the reach 
 _OPENING = 100.0  # weight of a gap against a force, over the stiffness of the springs, where contacts are taken as open
 _FULL_STEPS = 12  # Newton steps before they are halved
 _HALVINGS = 5  # of a Newton step
-FORCED = 1e-4
-"""Largest sliding in a step of a contact that sticks, relative to the reach, where no motion of the springs can prevent it."""
-
 _STILL = 1e-10  # [rad], Newton step after which no motion of the springs brings the equations any nearer
 
 
-def solve_step(step: Step, start: FloatArray, coefficient: float, *, patient: bool = True) -> tuple[Balance | None, int]:
+def solve_step(
+    step: Step, start: FloatArray, coefficient: float, *, patient: bool = True, forced: float = GAP
+) -> tuple[Balance | None, int]:
     """Solve a step from elastic coordinates, shape (n,).
 
     First by full Newton steps; where these do not converge, by steps that are halved while they do not lower the norm of all
@@ -58,6 +57,7 @@ def solve_step(step: Step, start: FloatArray, coefficient: float, *, patient: bo
         start: Elastic coordinates to start from, shape (n,).
         coefficient: Friction coefficient.
         patient: Whether to go on by halved steps.
+        forced: Largest sliding of contacts that stick where no motion of the springs can prevent it, relative to the reach.
 
     Returns:
         The equilibrium, None if there is none or it is not found; and the evaluations spent.
@@ -70,10 +70,10 @@ def solve_step(step: Step, start: FloatArray, coefficient: float, *, patient: bo
         while here is not None and spent < first + most:
             if _converged(step, here):
                 return here, spent
-            change = newton_change(here, coefficient)
+            change = _change(here, coefficient, GAP * step.reach, forced * step.reach)
             if change is None:
                 break
-            if float(np.linalg.norm(change[0])) <= _STILL and _converged(step, here, FORCED):
+            if float(np.linalg.norm(change[0])) <= _STILL and _converged(step, here, forced):
                 return here, spent
             scale = np.maximum(step.stiffness, here.tangent.diagonal())
             share = min(1.0, LARGEST_STEP / max(float(np.linalg.norm(change[0])), 1e-300))
@@ -87,6 +87,34 @@ def solve_step(step: Step, start: FloatArray, coefficient: float, *, patient: bo
                 share *= 0.5
             here = there
     return None, spent
+
+
+def _change(here: Balance, coefficient: float, none: float, forced: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+    """Newton's change, in which no contact is to do what others and the robot do not let it.
+
+    One whose gap would be left open by more than `none` [m] is taken as open: of contacts in nearly the same place, as on both
+    sides of a joint, no motion closes all gaps. Where all close, one that sticks and would be left sliding by more than
+    `forced` [m] slips, with its friction against that.
+    """
+    while True:
+        change, near, laws = newton_change(here, coefficient), here.contacts, here.laws
+        if change is None:
+            return None
+        left = np.where(laws.pressed, near.gaps + near.gradients @ change[0], 0.0)
+        slid = np.where(laws.sticks[:, None], near.sliding + near.jacobian @ change[0], 0.0)
+        ways = np.linalg.norm(slid, axis=1)
+        if left.max(initial=0.0) > none:
+            kept = np.arange(len(left)) != left.argmax()
+            laws = laws._replace(pressed=laws.pressed & kept, sticks=laws.sticks & kept, slips=laws.slips & kept)
+        elif ways.max(initial=0.0) > forced:
+            slips = np.arange(len(left)) == ways.argmax()
+            way = np.where(slips[:, None], -slid / np.maximum(ways, 1e-300)[:, None], laws.way)
+            broken = np.where(slips[:, None], here.friction - coefficient * here.normal[:, None] * way, laws.broken)
+            held = np.where(slips, 0.0, laws.held)
+            laws = laws._replace(sticks=laws.sticks & ~slips, slips=laws.slips | slips, way=way, held=held, broken=broken)
+        else:
+            return change
+        here = here._replace(laws=laws)
 
 
 def balance_of(step: Step, y: FloatArray, near: NearContacts, normal: FloatArray, friction: FloatArray, sticks: Any) -> Balance:

@@ -31,6 +31,7 @@ _ARMIJO = 1e-4  # share of the predicted decrease that a step must reach
 _SHORTEST = 1e-10  # share of a step below which it is not halved again
 _DEEP = 1e-2  # penetration that is repaired before energies count, and that no step leads into, relative to the reach
 _EXACT = 1e-12  # gap of a pressed contact that is zero, relative to the reach
+_ROUNDING = 1e-15  # of a gap, relative to how far away the centre of an obstacle is
 _LEAST_DAMPING = 0.02  # of the step after one that was cut, relative to the springs
 _LEAST_SEEN = 0.01  # gaps below this share of the reach are always seen
 _ESCAPE = 0.1  # [rad], step out of an unstable equilibrium
@@ -80,8 +81,10 @@ class ContactSearch:
         pressed = touch.gaps.values.take(touch.forces.nonzero()[0])
         gap = max(touch.penetration, *pressed.tolist()) if len(pressed) else touch.penetration
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
-        error = max(state.error / allowed, gap / (_EXACT * self._reach))
-        return Near(state, touch, error, seen, state.residual + touch.forces.dot(touch.rows))
+        error, apart = state.error / allowed, gap / (_EXACT * self._reach)
+        if error <= BALANCED < apart:
+            apart = gap / (_EXACT * self._reach + _ROUNDING * float(np.abs(touch.gaps.transforms).max(initial=0.0)))
+        return Near(state, touch, max(error, apart), seen, state.residual + touch.forces.dot(touch.rows))
 
     def descend(self, here: Near) -> tuple[Near, bool]:
         """Descend to an equilibrium; it leaves unstable ones.

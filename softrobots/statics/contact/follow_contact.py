@@ -46,9 +46,10 @@ def follow_contact(
 
     What changes has one row a parameter: motors, force, wrench, gravity; obstacles move by their poses at the parameter, and a
     robot that grows is a function of it, such as `lambda length: load_model(tube.grown(length))`. Between two parameters rows
-    are interpolated; steps are halved where they do not converge and where contacts change. At every contact the friction
-    sticks or slips within the cone :math:`|\lambda_t| \le \mu \lambda_n`, by the sliding since the last step, so that the
-    answer depends on the path. Where the robot cannot follow it snaps, as overdamped motion would: `ContactPath.jumps`.
+    are interpolated; steps are halved where they do not converge, where contacts change, and where they are so long that
+    something might pass through an obstacle. At every contact the friction sticks or slips within the cone
+    :math:`|\lambda_t| \le \mu \lambda_n`, by the sliding since the last step, so that the answer depends on the path. Where
+    the robot cannot follow it snaps, as overdamped motion would: `ContactPath.jumps`.
 
     Args:
         model: The robot; or a function `parameter -> SoftModel` of a robot that grows from its tip: of sections only, or with

@@ -18,9 +18,10 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.environment.gaps import Surroundings
+from softrobots.environment.swept import may_pass
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_laws import Balance
-from softrobots.statics.contact.coulomb import solve_step
+from softrobots.statics.contact.coulomb import GAP, solve_step
 from softrobots.statics.contact.last_state import MARGIN, Given, Sliding, forces_of
 from softrobots.statics.contact.sliding import SlidingRobot
 from softrobots.statics.equilibrium_result import Equilibrium
@@ -75,11 +76,16 @@ class Rest(NamedTuple):
         return self.robot.equilibrium(self.found, self.iterations)
 
 
-def settle(given: Given, last: Sliding, start: FloatArray, brake: float = 0.0, *, patient: bool = True) -> Rest | None:
-    """Solve one step from elastic coordinates, shape (n_springs,); None if it does not converge to a state that holds."""
+def settle(
+    given: Given, last: Sliding, start: FloatArray, brake: float = 0.0, *, patient: bool = True, forced: float = GAP
+) -> Rest | None:
+    """Solve one step from elastic coordinates, shape (n_springs,); None if it does not converge to a state that holds.
+
+    For `patient` and `forced` see `coulomb.solve_step`.
+    """
     with one_blas_thread(given.model.n_springs):
         robot = SlidingRobot(given, last, brake)
-        found, spent = solve_step(robot, start, last.friction, patient=patient)
+        found, spent = solve_step(robot, start, last.friction, patient=patient, forced=forced)
         if found is None or not robot.holds(found):
             return None
         return Rest(robot, found, robot.work(found), spent)
@@ -98,7 +104,20 @@ def step(given: Given, last: Rest, *, patient: bool = True) -> Rest | None:
     """
     sliding, start = carried_over(given, last)
     there = settle(given, sliding, start, patient=patient)
-    return None if there is None or change(given.model, there.q_springs, start) > FAR else there
+    if there is None or change(given.model, there.q_springs, start) > FAR or _through(there, sliding, last):
+        return None
+    return there
+
+
+def _through(there: Rest, sliding: Sliding, last: Rest) -> bool:
+    """Whether the robot may have passed through an obstacle since a rest, whose surfaces are those of `sliding`."""
+    now, before = there.robot, last.robot
+    return may_pass(
+        sliding.gaps,
+        now.at.gaps,
+        now.given.environment,
+        lambda margin: before.given.surroundings.at(before.at.q, margin),
+    )
 
 
 def move_to_rest(given: Given, last: Rest) -> Rest | None:
@@ -107,18 +126,18 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
     Returns:
         The state, with the work against friction of the whole motion.
     """
-    model, (sliding, here) = given.model, carried_over(given, last)
+    model, (sliding, here), state = given.model, carried_over(given, last), last
     brake, work = 1.0, 0.0
     for _ in range(_MOST_MOMENTS):
         there = settle(given, sliding, here, brake) or settle(given, let_go(sliding), here, brake)
         moved = np.inf if there is None else change(model, there.q_springs, here)
-        if there is None or moved > _FAR_MOVING:
+        if there is None or moved > _FAR_MOVING or _through(there, sliding, state):
             brake *= 4.0
             if brake > _STRONGEST:
                 return None
             continue
         work += there.work
-        sliding, here = there.sliding, there.q_springs
+        sliding, here, state = there.sliding, there.q_springs, there
         if moved < _NEARLY_AT_REST:
             rest = settle(given, sliding, here)
             if rest is not None and change(model, rest.q_springs, here) < _NEARLY_AT_REST:

@@ -40,6 +40,7 @@ from softrobots.statics.tip_steps import TipModel
 _MOST_TURNS = 100  # small steps of the motors before one of the tip
 _MOST_EASED = 8  # times that a jammed tip is let press less
 _MOST_NEARER = 5  # corrections of motors that turn more than they must
+_FORCED = 1e-4  # sliding in a step of a contact that sticks, over the reach, until the motors have been found that prevent it
 _NO_MOTION = 1e-6  # of the tip, relative to the largest
 
 
@@ -72,7 +73,7 @@ class RubbingTip:
         """Solve the step from elastic coordinates, shape (n_springs,); None if it does not converge to a state that holds."""
         if not self.model.actuators.admit(q_motors):
             return None
-        rest = settle(self.given._replace(q_motors=q_motors), self.last, start)
+        rest = settle(self.given._replace(q_motors=q_motors), self.last, start, forced=_FORCED)
         if rest is None:
             return None
         translation, turn = self.goal.missing(self.model, rest.robot.at.q)
