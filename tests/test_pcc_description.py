@@ -774,7 +774,7 @@ CHAINS_ = [
     (within_joint("section_1_1_c", "origin", xyz="0 0 0.3", rpy="0 0 0.1"), "section_1_1_c .* not where the rest shape"),
     (within_joint("section_1_1_r1", "origin", rpy="0.01 0 0"), "section_1_1_r1 .* not where the rest shape"),
     (within_joint("section_1_1_r2", "origin", xyz="0.01 0 0"), "section_1_1_r2 .* not where the rest shape"),
-    (changed("section", "section_1_1", length="0.2"), "section_1_1_c .* not where the rest shape"),
+    (changed("section", "section_1_1", length="0.4"), "section_1_1_c .* not where the rest shape"),
     (changed("section", "section_1_1", rest="0.5 0.0 0.0 1.0"), "not where the rest shape"),
     (changed("section", "section_1_1", rest="0.0 0.0 0.5 1.0"), "section_1_1_r3 .* not where the rest shape"),
     (changed("section", "section_1_1", rest="0.0 0.0 0.0 1.1"), "section_1_1_c .* not where the rest shape"),
