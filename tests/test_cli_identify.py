@@ -65,7 +65,7 @@ def test_a_folder_holds_the_fit_and_a_robot_for_other_commands(folder: Path, tol
     assert (answer["message"], answer["fitted"]["rows"], answer["validation"]["rows"]) == ("converged", 8, 4)
     assert answer["validation"]["errors"]["positions.tip"]["root_mean_square"] < 1e-7
     assert np.shape(answer["covariance"]) == (4, 4)
-    names = ["report.txt", "identification.json", "identification.npz", "predictions.csv", "robot.yaml"]
+    names = ["identification.npz", "predictions.csv", "robot.yaml", "report.txt", "identification.json"]
     pictures = [f"{name}.png" for name in ("residuals", "predicted", "values", "correlation", "ellipses")]
     drawn = pictures if importlib.util.find_spec("matplotlib") else []
     assert [Path(file).name for file in answer["files"]] == [*names, *drawn, "page.html"]

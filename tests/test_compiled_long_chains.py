@@ -92,6 +92,8 @@ def test_no_failure_touches_another(name: str, rng: np.random.Generator) -> None
     found = solver.equilibria(evil_motors, evil_forces)
     good = np.setdiff1d(np.arange(30), [0, 4, 7, 11, 12, 29])
     for field, value in vars(found).items():
+        if value is None:  # what friction remembers
+            continue
         assert np.array_equal(np.asarray(value)[good], np.asarray(getattr(clean, field))[good]), field
         assert not np.any(np.isnan(np.asarray(value, dtype=float))), field
         assert not value.flags.writeable

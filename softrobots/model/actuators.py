@@ -201,14 +201,14 @@ class Actuators:
 
         Raises:
             ParameterError: If the shape differs, a name is missing, a number is not finite, or an actuator that only pulls
-                pushes by more than five times `std`, shape (n_motors,) [N m or N] or None; lists the actuators.
+                pushes by over five `std`, shape (n_motors,) [N m or N], or a tenth of the largest load; lists the actuators.
             NameNotFound: If there is no actuator of a name.
         """
         loads = finite_array(field, self.in_order(value, field), (len(self.names),), self.described_loads)
-        at_most = loads if std is None else loads + 5.0 * std
-        pushed = [] if self._laws is None else self._laws.pushed(at_most[self.n_placed :])
-        if pushed:
-            raise ParameterError(field, loads, f"0 or above, within 5 torque_std, of {', '.join(pushed)}, which only pull")
+        at_most = loads + (0.1 * np.abs(loads).max(initial=0.0) if std is None else 5.0 * std)
+        if self._laws is not None and (pushed := self._laws.pushed(at_most[self.n_placed :])):
+            most = "5 torque_std" if std is not None else "a tenth of the largest"
+            raise ParameterError(field, loads, f"0 or above, within {most}, of {', '.join(pushed)}, which only pull")
         return loads
 
     def _refusal(self, motors: FloatArray) -> str | None:
