@@ -228,3 +228,32 @@ def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
             if engine == "general" or runs % 50 == 0:  # Pinocchio computes those of compiled motion, slowly
                 assert np.all(np.isfinite(moved.energy.balance))
     assert failed < runs / 100, (failed, runs)
+
+
+@pytest.mark.study
+@pytest.mark.shortened(6, 200)
+def test_random_pulses_and_moving_motors_keep_their_energy(cases: int) -> None:
+    """Loads that jump at round times, motors that move, steps that are chosen, both engines: the tip agrees, energy is kept."""
+    rng, model = np.random.default_rng(8), sr.load_model(sr.InflatableArm())
+    fast = sr.compile(model)
+    for case in range(cases):
+        duration, (begin, end) = (
+            float(rng.choice([0.5, 1.0, 2.0])),
+            np.sort(rng.choice(np.arange(1, 20), 2, replace=False)) / 20.0,
+        )
+        push, swing, rate = rng.normal(size=3) * 4.0, rng.normal(size=3) * 0.2, rng.integers(1, 6)
+
+        def force(t: float, span: Any = (begin * duration, end * duration), push: np.ndarray = push) -> np.ndarray:
+            return push * (span[0] < t < span[1])
+
+        def path(t: float, swing: np.ndarray = swing, rate: Any = rate) -> np.ndarray:
+            return swing * np.sin(rate * t) ** 2
+
+        options: dict[str, Any] = {"force": force, "damping_time": float(rng.choice([1e-3, 1e-2])), "gravity": sr.EARTH_GRAVITY}
+        moved = [engine(duration, path, **options) for engine in (partial(sr.simulate, model), fast.simulate)]
+        for motion in moved:
+            assert np.diff(motion.steps).min() > 1e-9 * duration, case
+            work = np.abs(motion.energy.load_work).max() + np.abs(motion.energy.motor_work).max()
+            assert np.abs(motion.energy.balance).max() < 0.02 * work, case  # the tip is known to 5e-4 of the reach
+        tips = np.linalg.norm(moved[0].tip_position - moved[1].tip_position, axis=1)
+        assert tips.max() < 2.0 * 5e-4 * model.reach, case
