@@ -114,7 +114,7 @@ def suspicions(
         components: Names of the columns; of others than three, their numbers from 1.
     """
     m, p = np.asarray(measured, dtype=float), np.asarray(predicted, dtype=float)
-    known = np.isfinite(m).all(axis=1) & np.isfinite(p).all(axis=1)
+    known = _known(m, p)
     if np.count_nonzero(known) < _FEWEST:
         return []
     mine, theirs = _centred(m[known]), _centred(p[known])
@@ -193,25 +193,27 @@ def _other_frame(found: Identification, key: str, rows: Measurements, before: fl
 def _reversed_actuators(found: Identification, key: str, few: slice) -> list[str]:
     """The actuators whose reversal explains far more of positions, if any are: what else is fitted hides them.
 
-    Slopes `M` by commands are compared with those of the robot as it was given, `P`, whatever turn `R` the base has: over signs
-    `S`, :math:`|M - R P S|^2` is least where the sum of singular values of :math:`P S M^T` is largest (Wahba 1965).
+    Slopes `M` by commands are compared with those of the robot as it was given, `P`, whatever turn `R` the base has. With the
+    commands' squares :math:`q^T q = L L^T` and over signs `S`, :math:`|(M - R P S) L|^2` is least where the sum of singular
+    values of :math:`P S L L^T M^T` is largest (Wahba 1965).
     """
     rows, base = found.fitted.measurements[few], [name for name in found.names if name.startswith("base.")]
     if not base:
         return []
     fit = identify(found.model, rows, ParameterSet.of(found.model, base, rows.markers), max_iterations=_STEPS)
     measured, predicted = _points(rows.measured[key]), _points(fit.fitted.predicted[key])
-    known = np.isfinite(measured).all(axis=1) & np.isfinite(predicted).all(axis=1)
+    known = _known(measured, predicted)
     q, n = _centred(rows.q_motors[known]), rows.q_motors.shape[1]
     if not 2 * n < len(q) or n > _MOST_REVERSED or np.linalg.matrix_rank(q) < n:
         return []
     root = np.linalg.cholesky(q.T @ q).T
     slopes, expected = (np.linalg.lstsq(q, _centred(values[known]), rcond=None)[0].T for values in (measured, predicted))
     signs = np.array(sorted(itertools.product((1.0, -1.0), repeat=n), key=sum, reverse=True))
-    turned, sizes, back = np.linalg.svd(slopes @ root.T @ ((expected * signs[:, None]) @ root.T).transpose(0, 2, 1))
+    mine, theirs = slopes @ root.T, (expected * signs[:, None]) @ root.T
+    turned, sizes, back = np.linalg.svd(mine @ theirs.transpose(0, 2, 1))
     sizes[:, 2] *= np.linalg.det(turned @ back)
-    whole = np.sum((slopes @ root.T) ** 2)
-    shares = (whole + np.sum(((expected * signs[:, None]) @ root.T) ** 2, axis=(1, 2)) - 2.0 * sizes.sum(axis=1)) / whole
+    whole = np.sum(mine**2)
+    shares = (whole + np.sum(theirs**2, axis=(1, 2)) - 2.0 * sizes.sum(axis=1)) / whole
     best = int(np.argmax(shares <= shares.min() + 0.1 * UNEXPLAINED))  # of nearly equal ones that with the fewest
     if not (shares[0] > UNEXPLAINED and shares[best] < FAR_LESS * shares[0]):
         return []
@@ -254,8 +256,13 @@ def _points(values: FloatArray) -> FloatArray:
 
 def _unexplained(measured: FloatArray, predicted: FloatArray) -> float:
     """Unexplained share of the variance, of rows that are complete."""
-    known = np.isfinite(measured).all(axis=1) & np.isfinite(predicted).all(axis=1)
+    known = _known(measured, predicted)
     return _share(_centred(measured[known]), _centred(predicted[known])) if known.any() else 0.0
+
+
+def _known(measured: FloatArray, predicted: FloatArray) -> Any:
+    """Mask of the rows that are complete in both, shape (n,)."""
+    return np.isfinite(measured).all(axis=1) & np.isfinite(predicted).all(axis=1)
 
 
 def _words(after: float, before: float) -> str:
