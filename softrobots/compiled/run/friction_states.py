@@ -66,15 +66,10 @@ def state_after(actuation: Actuation, layout: Any, w: Any) -> StatesBefore | Non
     """Return the state that a workspace holds after a step, as the one before the next; None without dry friction."""
     if not layout.rubbing:
         return None
-    unknowns, sliders, anchors = (
-        np.array(w[place : place + count], dtype=np.float64)[None]
-        for place, count in (
-            (layout.unknown, layout.unknowns),
-            (layout.slid, layout.unknowns),
-            (layout.anchored, layout.guides),
-        )
-    )
-    return StatesBefore(actuation.elastic(unknowns), sliders, anchors, np.array([Status.CERTIFIED]))
+    n, guides = layout.unknowns, layout.guides
+    parts = (w[place : place + count] for place, count in ((layout.unknown, n), (layout.slid, n), (layout.anchored, guides)))
+    springs, sliders, anchors = (np.array(part, dtype=np.float64)[None] for part in parts)
+    return StatesBefore(actuation.elastic(springs), sliders, anchors, np.array([Status.CERTIFIED]))
 
 
 def remembered(actuation: Actuation, before: StatesBefore) -> SoftModel:
