@@ -100,11 +100,13 @@ def test_the_moment_of_friction_acts_against_the_bending_whatever_its_direction(
     assert np.abs(aside).max() < 1e-9
 
 
-def test_a_tendon_in_its_guides_follows_the_capstan() -> None:
+@pytest.mark.parametrize("locked", [(), pytest.param(("bend_x", "twist", "stretch"), marks=pytest.mark.study)], ids=str)
+def test_a_tendon_in_its_guides_follows_the_capstan(locked: tuple[str, ...]) -> None:
     r"""`EI theta' = T d exp(-mu theta)`, so :math:`\theta = \log(1 + \mu T d s / EI) / \mu`; let go, with the other sign."""
     errors = []
     for sections in (4, 8):
-        fast = compiled(one_segment(elastic_sections=sections, bending_friction=0.0, guide_friction=0.4))
+        robot = one_segment(elastic_sections=sections, bending_friction=0.0, guide_friction=0.4)
+        fast = compiled(robot, locked_strains=locked)
         pulled = fast.equilibrium([6.0])
         let_go = fast.equilibrium([1.8], previous=pulled)
         for found, tension, mu in ((pulled, 6.0, 0.4), (let_go, 1.8, -0.4)):
@@ -164,6 +166,7 @@ ROBOTS: dict[str, tuple[Any, float, float]] = {
         2e-3,
         0.05,
     ),
+    "guides_of_bent": (sr.TendonArm(rest_bend_x=0.7, rest_twist=0.4, guide_friction=0.2, elastic_sections=2), 2e-3, 0.05),
     "guides_mixed": (
         sr.TendonArm(kind=("elastic", "tension", "elastic"), guide_friction=0.1, elastic_sections=2),
         1e-3,
