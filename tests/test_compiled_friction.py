@@ -20,16 +20,16 @@ STICK = 1e-4  # [rad] that a section bends before its friction is whole, see `dr
 
 
 def one_segment(**fields: Any) -> sr.TendonArm:
-    return sr.TendonArm(
-        segment_lengths=(LENGTH,),
-        tendon_azimuths=(0.0,),
-        tendon_distance=DISTANCE,
-        kind="tension",
-        bending_stiffness=EI,
-        elastic_sections=4,
-        bending_friction=MOMENT,
-        **fields,
-    )
+    given = {
+        "segment_lengths": (LENGTH,),
+        "tendon_azimuths": (0.0,),
+        "tendon_distance": DISTANCE,
+        "kind": "tension",
+        "bending_stiffness": EI,
+        "elastic_sections": 4,
+        "bending_friction": MOMENT,
+    }
+    return sr.TendonArm(**(given | fields))
 
 
 @pytest.fixture(scope="module")
@@ -100,7 +100,78 @@ def test_the_moment_of_friction_acts_against_the_bending_whatever_its_direction(
     assert np.abs(aside).max() < 1e-9
 
 
+@pytest.mark.parametrize("locked", [(), pytest.param(("bend_x", "twist", "stretch"), marks=pytest.mark.study)], ids=str)
+def test_a_tendon_in_its_guides_follows_the_capstan(locked: tuple[str, ...]) -> None:
+    r"""`EI theta' = T d exp(-mu theta)`, so :math:`\theta = \log(1 + \mu T d s / EI) / \mu`; let go, with the other sign."""
+    errors = []
+    for sections in (4, 8):
+        robot = one_segment(elastic_sections=sections, bending_friction=0.0, guide_friction=0.4)
+        fast = compiled(robot, locked_strains=locked)
+        pulled = fast.equilibrium([6.0])
+        let_go = fast.equilibrium([1.8], previous=pulled)
+        for found, tension, mu in ((pulled, 6.0, 0.4), (let_go, 1.8, -0.4)):
+            expected = np.log1p(mu * tension * DISTANCE * LENGTH / EI) / mu
+            errors.append(found.q_springs.reshape(sections, 4)[:, 1].sum() / expected - 1.0)
+            frictionless = tension * DISTANCE * LENGTH / EI
+            assert abs(frictionless / expected - 1.0) > 60.0 * abs(errors[-1])
+    assert np.divide(errors[:2], errors[2:]) == pytest.approx([4.0, 4.0], abs=0.2)  # second order in the sections
+    assert np.abs(errors[2:]).max() < 2e-4
+
+
+def test_guides_slip_where_their_friction_is_whole() -> None:
+    """Complementarity at each guide to 1e-9 of the stick, with lengths from the strains.
+
+    A slider moves only where the length beyond it is a stick away, and towards it.
+    """
+    fast = compiled(sr.TendonArm(segment_lengths=(0.06, 0.07), kind="tension", guide_friction=0.2, elastic_sections=2))
+    paths, rng = fast.model.structure.muscle_paths, np.random.default_rng(2)
+    rest = paths.at(fast.model.rest).pieces
+    sticks = 1e-5 * np.array([tag.rest_length for tag in fast.model.muscles])[paths.muscle]
+    last, before, moved_at_all, stuck_at_all = None, np.zeros(len(sticks)), 0, 0
+    tensions = np.full(6, 1.0)
+    for size in (0.9, 0.003, 0.1, 0.01, 0.3):  # [N]: small steps do not turn all guides round
+        tensions = tensions + size * rng.uniform(-1.0, 1.0, 6)
+        last = fast.equilibrium(tensions, (0.01, 0.02, 0.0), previous=last)
+        change = paths.at(last.q_springs).pieces - rest
+        beyond = np.array(
+            [change[g + 1 :][paths.muscle[g + 1 :] == muscle].sum() + 0.5 * change[g] for g, muscle in enumerate(paths.muscle)]
+        )
+        share, moved = (last.friction_slip - beyond) / sticks, (last.friction_slip - before) / sticks
+        assert np.abs(share).max() < 1.0 + 1e-9
+        slips = np.abs(moved) > 1e-6
+        assert np.abs(share[slips] + np.sign(moved[slips])).max(initial=0.0) < 1e-9
+        before, moved_at_all, stuck_at_all = last.friction_slip, moved_at_all + slips.sum(), stuck_at_all + (~slips).sum()
+    assert moved_at_all > 10
+    assert stuck_at_all > 10
+
+
+AROUND = [sr.Route(at=(0.0, 0.2), azimuth=(a, a + 4.7), distance=0.0045) for a in (0.0, 2.0944, 4.1888)]
+CONES = [sr.Route(at=(0.0, 0.15), azimuth=(a, a + 0.5), distance=(0.008, 0.003)) for a in (0.0, 2.0944, 4.1888)]
+
 ROBOTS: dict[str, tuple[Any, float, float]] = {
+    "guides": (sr.TendonArm(kind="tension", guide_friction=0.1, elastic_sections=2), 0.8, 0.05),
+    "both": (sr.TendonArm(kind="tension", bending_friction=1e-3, guide_friction=0.1, elastic_sections=2), 0.8, 0.05),
+    "guides_elastic": (sr.TendonArm(guide_friction=0.1, elastic_sections=2), 2e-3, 0.05),
+    "guides_lengths": (sr.PccArm(guide_friction=0.1, elastic_sections=2), 0.02, 1.0),
+    "guides_from_base": (sr.PccArm(guide_friction=0.1, routing="base", elastic_sections=2), 5e-3, 1.0),
+    "guides_and_hinges": (sr.PccArm(guide_friction=0.1, chain="lumped", elastic_sections=2), 0.02, 1.0),
+    "guides_of_one_segment": (sr.TendonArm(segment_lengths=(0.06, 0.07), guide_friction=(0.0, 0.2)), 2e-3, 0.05),
+    "guides_around": (
+        sr.TendonArm(segment_lengths=(0.2,), elastic_sections=3, kind="tension", guide_friction=0.2, routing=AROUND),
+        0.8,
+        0.05,
+    ),
+    "guides_of_cones": (
+        sr.TendonArm(segment_lengths=(0.2,), elastic_sections=4, guide_friction=0.2, routing=CONES),
+        2e-3,
+        0.05,
+    ),
+    "guides_of_bent": (sr.TendonArm(rest_bend_x=0.7, rest_twist=0.4, guide_friction=0.2, elastic_sections=2), 2e-3, 0.05),
+    "guides_mixed": (
+        sr.TendonArm(kind=("elastic", "tension", "elastic"), guide_friction=0.1, elastic_sections=2),
+        1e-3,
+        0.05,
+    ),
     "tensions": (sr.TendonArm(kind="tension", bending_friction=1e-3, elastic_sections=2), 0.8, 0.05),
     "elastic": (sr.TendonArm(bending_friction=1e-3, elastic_sections=2), 2e-3, 0.05),
     "lengths": (sr.PccArm(bending_friction=0.3), 0.02, 1.0),
@@ -113,11 +184,35 @@ ROBOTS: dict[str, tuple[Any, float, float]] = {
 
 
 def ways(model: sr.SoftModel, change: float, force: float, count: int) -> list[tuple[np.ndarray, np.ndarray]]:
-    """Random actuators and forces, one step after the other."""
-    rng = np.random.default_rng(7)
-    tense = model.actuators.units[0] == "N"
-    moved = [rng.uniform(-1.0, 1.0, model.n_motors) * change for _ in range(count)]
-    return [(model.relaxed_motors + (np.abs(one) if tense else one), rng.normal(size=3) * force) for one in moved]
+    """Random actuators and forces, one step after the other; each second step is small, so that parts stick."""
+    rng, found = np.random.default_rng(7), list[tuple[np.ndarray, np.ndarray]]()
+    tense = np.array([unit == "N" for unit in model.actuators.units])
+    change = np.where(tense, max(change, 0.8), change)
+    for number in range(count):
+        moved, push = rng.uniform(-1.0, 1.0, model.n_motors) * change, rng.normal(size=3) * force
+        if number % 2:
+            moved, push = found[-1][0] - model.relaxed_motors + 0.02 * moved, found[-1][1] + 0.02 * push
+        found.append((model.relaxed_motors + np.where(tense, np.abs(moved), moved), push))
+    return found
+
+
+@pytest.mark.study
+def test_strong_friction_of_given_lengths_settles() -> None:
+    """Steps of lengths whose guides rub by 0.3: at the last one a descent can go to and fro between two points for ever.
+
+    One has less energy, the other less residual. The tip is that of the general solver, to 1e-9 of the reach.
+    """
+    fast = compiled(sr.PccArm(guide_friction=0.3))
+    model, slow = fast.model, None
+    for moved, force in (
+        ((-0.0084, 0.0085, -0.0071, -0.0071, 0.0002, -0.029), (4.148, -2.874, -5.866)),
+        ((-0.0034, -0.0174, 0.0243, -0.029, -0.0118, 0.0299), (0.225, 4.401, -5.696)),
+        ((0.0184, 0.0078, -0.0082, 0.0156, -0.0284, -0.0032), (-13.556, 0.209, -8.087)),
+    ):
+        motors = model.relaxed_motors + moved
+        quick = fast.equilibrium(motors, force, gravity=sr.EARTH_GRAVITY, previous=slow)
+        slow = sr.solve_equilibrium(model, motors, force, gravity=sr.EARTH_GRAVITY, previous=slow)
+        assert np.abs(quick.tip_position - slow.tip_position).max() < 1e-9 * model.reach
 
 
 @pytest.mark.study
@@ -184,8 +279,9 @@ def test_a_row_without_a_state_before_keeps_its_status(fast: CompiledModel) -> N
     assert np.isfinite(after.friction_bending).all()
 
 
-def test_a_force_comes_back_from_the_tensions_and_the_state_before() -> None:
-    fast = compiled(sr.TendonArm(segment_lengths=(0.06, 0.07), bending_friction=5e-4, elastic_sections=1))
+@pytest.mark.parametrize("fields", [{"bending_friction": 5e-4}, {"guide_friction": 0.1}], ids=["bending", "guides"])
+def test_a_force_comes_back_from_the_tensions_and_the_state_before(fields: dict[str, float]) -> None:
+    fast = compiled(sr.TendonArm(segment_lengths=(0.06, 0.07), elastic_sections=1, **fields))
     motors = fast.model.relaxed_motors - (1e-3, 0.0, 0.0, 0.0, 0.0, 0.0)
     before, force = fast.equilibrium(motors), np.array([0.05, 0.1, 0.0])
     slow = sr.solve_equilibrium(fast.model, motors)
@@ -204,8 +300,6 @@ def test_a_force_comes_back_from_the_tensions_and_the_state_before() -> None:
         (lambda fast: fast.simulate(0.1, [1.0]), "without dry friction, for compiled motion; simulate has it"),
         (lambda fast: fast.c_source(motion=True), "without dry friction, for compiled motion"),
         (lambda fast: fast.js_source(), "without dry friction, for solvers on pages"),
-        (lambda fast: fast.inverse_kinematics([[0.0, 0.0, 0.05]]), "without dry friction, for compiled inverse kinematics"),
-        (lambda fast: fast.follow([[0.0, 0.0, 0.05]]), "without dry friction, for compiled paths"),
         (lambda fast: fast.equilibrium([1.0], environment=sr.Environment([])), "without dry friction, for compiled contact"),
         (lambda fast: fast.equilibrium([1.0], previous=1), "an Equilibrium of the model"),
         (lambda fast: fast.equilibria([1.0], np.zeros(3), previous=[]), "at least one state"),
@@ -222,7 +316,11 @@ def test_a_force_comes_back_from_the_tensions_and_the_state_before() -> None:
             lambda fast: fast.equilibrium([1.0], previous=compiled(one_segment(rest_bend_x=1.0)).equilibrium([1.0])),
             "of the model given",
         ),
-        (lambda _: compiled(one_segment(guide_friction=0.1)), "without friction in guides, to be compiled"),
+        (
+            lambda fast: fast.inverse_kinematics([[0.0, 0.0, 0.05]], previous=fast.equilibria(np.ones((2, 1)), np.zeros(3))),
+            "one equilibrium",
+        ),
+        (lambda fast: fast.follow([[0.0, 0.0, 0.05]], previous=1), "an Equilibrium of the model"),
     ],
 )
 def test_what_makes_no_sense_is_refused(fast: CompiledModel, call: Callable[[CompiledModel], Any], words: str) -> None:
@@ -242,11 +340,15 @@ def test_a_robot_without_friction_remembers_nothing() -> None:
         )
 
 
+RUBBING = ({"bending_friction": MOMENT}, {"bending_friction": 0.0, "guide_friction": 0.2})
+
+
 @pytest.mark.study
-def test_numba_takes_the_same_steps(tool: Callable[[str], Any]) -> None:
+@pytest.mark.parametrize("fields", RUBBING, ids=["bending", "guides"])
+def test_numba_takes_the_same_steps(tool: Callable[[str], Any], fields: dict[str, float]) -> None:
     """Alone and in lanes, ten robots at a time: springs of the Python back end to 1e-9 rad or m."""
     tool("numba")
-    quick, plain = compiled(one_segment(), "numba"), compiled(one_segment())
+    quick, plain = compiled(one_segment(**fields), "numba"), compiled(one_segment(**fields))
     loops = np.random.default_rng(3).uniform(0.0, 3.0, (6, 10, 1))
     last = before = alone = None
     for tensions in loops:
@@ -259,9 +361,10 @@ def test_numba_takes_the_same_steps(tool: Callable[[str], Any]) -> None:
 
 
 @pytest.mark.system
-def test_c_code_takes_the_same_steps(fast: CompiledModel, tmp_path: Path) -> None:
+@pytest.mark.parametrize("fields", RUBBING, ids=["bending", "guides"])
+def test_c_code_takes_the_same_steps(fields: dict[str, float], tmp_path: Path) -> None:
     """From the last unknowns and sliders, as a control loop does."""
-    last, loop = None, [1.0, 3.0, 2.0, 0.2]
+    last, loop, fast = None, [1.0, 3.0, 2.0, 0.2], compiled(one_segment(**fields))
     in_c = Controller(fast, tmp_path, name="segment")
     in_c.clear()
     for tension in loop:
@@ -269,4 +372,30 @@ def test_c_code_takes_the_same_steps(fast: CompiledModel, tmp_path: Path) -> Non
         in_c.put("ACTUATORS", np.array([tension]))
         assert in_c.call("settle_from") == Status.CERTIFIED
         in_c.put("SLIDERS", in_c.get("SLID", 16))
+        if "ANCHORS" in in_c.place:
+            in_c.put("ANCHORS", in_c.get("ANCHORED", 4))
         assert in_c.get("UNKNOWN", 16) == pytest.approx(last.q_springs, abs=1e-12)
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(
+    "fields", [{"kind": "tension", "bending_friction": 1e-3}, {"bending_friction": 3e-4, "guide_friction": 0.1}], ids=str
+)
+def test_motors_are_found_from_a_state_before(fields: dict[str, Any]) -> None:
+    """The general solver, stepping to these motors from the same state, has the tip at the targets, to their tolerance."""
+    fast = compiled(sr.TendonArm(elastic_sections=2, **fields))
+    model = fast.model
+    first = np.full(9, 1.0) if "kind" in fields else model.relaxed_motors - 1e-3
+    before = sr.solve_equilibrium(model, first)
+    targets = before.tip_position + np.array([0.3, 0.8, 0.3])[:, None] * (0.02, 0.01, -0.003)
+    found = fast.inverse_kinematics(targets[0], q_motors0=first, previous=before)
+    assert found.certified.all()
+    there = sr.solve_equilibrium(model, found.q_motors[0], previous=before)
+    assert np.linalg.norm(there.tip_position - targets[0]) < 2e-9
+    path = fast.follow(targets, q_motors0=first, previous=before)
+    assert path.certified.all()
+    last = before
+    for motors, target in zip(path.q_motors, targets, strict=True):
+        last = sr.solve_equilibrium(model, motors, previous=last)
+        assert np.linalg.norm(last.tip_position - target) < 2e-9
+    assert np.abs((path.q_motors[2] - path.q_motors[0]) / model.motor_scale).max() > 1e-3  # the way back is another one

@@ -169,6 +169,20 @@ def test_a_trajectory_remembers_its_way(tmp_path: Path) -> None:
 
 
 @pytest.mark.study
+@pytest.mark.parametrize("fields", [{"bending_friction": 3e-4}, {"bending_friction": 5e-4, "guide_friction": 0.2}], ids=str)
+def test_a_search_gets_past_what_sticks(fields: dict[str, float]) -> None:
+    """From one start, with both frictions, in less than its hundred steps; the motors put the tip there from rest."""
+    model = sr.load_model(sr.TendonArm(kind="tension", elastic_sections=2, **fields))
+    start = sr.solve_equilibrium(model, np.full(9, 1.0))
+    target = start.tip_position + (0.006, 0.003, -0.0009)
+    found = sr.solve_ik(model, target, q_motors0=np.full(9, 1.0), starts=1)
+    assert found.iterations < 100
+    assert found.equilibrium.within_limits
+    again = sr.solve_equilibrium(model, found.q_motors)
+    assert np.linalg.norm(again.tip_position - target) < 2e-9  # twice the tolerance of the search
+
+
+@pytest.mark.study
 def test_a_copy_of_a_result_remembers_what_the_result_does() -> None:
     """A small step back only sticks, so that what is remembered then is of the step before."""
     model = sr.load_model(sr.TendonArm(kind="tension", bending_friction=MOMENT, guide_friction=0.1, elastic_sections=2))

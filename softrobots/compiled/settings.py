@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from softrobots.core import checks
-from softrobots.model import springs
+from softrobots.model import friction_coordinates, springs
 from softrobots.statics import elastic_state, elastostatics, tip_search
 from softrobots.statics.tip_force import force_search
 
@@ -75,6 +75,15 @@ RANK_TOLERANCE = 1e-6
 
 HIDDEN = force_search.HIDDEN
 """Share of the motor torques that may stay unexplained where a direction of the force is not observable."""
+
+GUIDE_ROUNDS = friction_coordinates.MOST_ROUNDS
+"""Most changes of the friction of guides on the way to the one that stays."""
+
+SAME_GRIP = friction_coordinates.SAME_FRICTION
+"""Change of that friction that is none, relative to the largest tension."""
+
+GRIP_RUNAWAY = friction_coordinates.RUNAWAY
+"""Change that it does not come back from, likewise."""
 
 PASSES = 10
 """Newton passes before the descent or the search takes over a case."""

@@ -77,6 +77,7 @@ def read_chain(
         slack_hinges=_slack_hinges(str(pinocchio_model.name), elements, groups),
         wound=_wound(str(pinocchio_model.name), elements, structure),
         friction=_friction(structure),
+        guides=structure.friction if structure.guided else None,
     )
     return replace(chain, constrained=(), constrained_slope=read_only(np.zeros((0, muscles)))) if chain.routed else chain
 
@@ -124,7 +125,8 @@ def _friction(structure: Structure) -> tuple[tuple[int, int, float], ...]:
 def _wound(name: str, elements: Sequence[Element], structure: Structure) -> tuple[tuple[int, int], ...]:
     """The joints of lumped sections that are one element, see `SerialChain.wound`."""
     paths, found = structure.muscle_paths, []
-    joined = {one for one, straight in zip(paths.sections, paths.separable, strict=True) if paths.lumped and not straight}
+    apart = paths.separable & (not structure.guided)
+    joined = {one for one, straight in zip(paths.sections, apart, strict=True) if paths.lumped and not straight}
     rubbing = {place for place, *_ in _friction(structure)}
     joined |= {one.name for one in structure.section_table if one.lumped and rubbing & set(one.places.values())}
     row_of = {element.strain: row for row, element in enumerate(elements) if joined and isinstance(element, ChainJoint)}

@@ -34,6 +34,7 @@ from softrobots.model.sections import SectionRow
 BENDING_STICK = 1e-4
 """Stick of a section that bends [rad]."""
 
+_STILL = 1.0 + 1e-6  # of a stick, up to which nothing slips
 _GUIDE_STICK = 1e-5  # of an actuator, relative to its length at rest
 
 
@@ -77,7 +78,8 @@ class DryFriction:
         self.n_guides = len(paths.muscle) if self.guided else 0
         """Number of guides, one a path; 0 if there is no friction in guides."""
         if self.guided:
-            self._stick = _GUIDE_STICK * np.array([tag.rest_length for tag in tags])[paths.muscle]
+            self.stick = _GUIDE_STICK * np.array([tag.rest_length for tag in tags])[paths.muscle]
+            """Stick of each guide, shape (n_guides,) [m]."""
             same = paths.muscle[:, None] == paths.muscle
             self._beyond = np.triu(same, 1) + 0.5 * np.eye(self.n_guides)  # lengths beyond a guide by pieces
             self._before = np.tril(same, -1).astype(np.float64)
@@ -85,7 +87,8 @@ class DryFriction:
             pairs = [(point, sections[point.section]) for tag in tags for point in route_points(tag.route, spans)]
             self.coefficient = np.array([guides.get(row.segment, 0.0) for _, row in pairs])
             turns = [_turn(point, row) for point, row in pairs]
-            self._rest, self._slope = (np.array(part) for part in zip(*turns, strict=True))
+            self.turns = tuple(np.array(part) for part in zip(*turns, strict=True))
+            """Turn of the body and tangent at each guide at zero strains, (n_guides, 2, 3), and by strains, (..., 4)."""
 
     @property
     def untouched(self) -> FrictionMemory:
@@ -101,7 +104,7 @@ class DryFriction:
         bending = place[self.places] - apart * share[:, None]
         if not self.guided:
             return FrictionMemory(bending, memory.slip, memory.pieces)
-        slip = np.clip(self._slipped(self._paths.at(strains).pieces, memory), -self._stick, self._stick)
+        slip = np.clip(self._slipped(self._paths.at(strains).pieces, memory), -self.stick, self.stick)
         pieces = self._paths.at(place).pieces
         return FrictionMemory(read_only(bending), read_only(slip), read_only(pieces))
 
@@ -110,9 +113,10 @@ class DryFriction:
         if not self.guided:
             return np.zeros(0)
         z = np.append(strains, 0.0)[self._paths.places]
-        turning, tangent = np.swapaxes(self._rest + (self._slope @ z[:, None, :, None])[..., 0], 0, 1)
+        rest, slope = self.turns
+        turning, tangent = np.swapaxes(rest + (slope @ z[:, None, :, None])[..., 0], 0, 1)
         angles = np.linalg.norm(np.cross(turning, tangent), axis=1) / np.linalg.norm(tangent, axis=1)
-        slips = self._slipped(self._paths.at(strains).pieces, memory) / self._stick
+        slips = self._slipped(self._paths.at(strains).pieces, memory) / self.stick
         exponent = self.coefficient * angles
         along = exponent * np.clip(slips, -1.0, 1.0)
         before = np.abs(tensions)[self._paths.muscle] * np.exp(-self._before @ along)
@@ -133,11 +137,11 @@ class DryFriction:
         if self.guided:
             paths = self._paths.at(strains)
             slip = self._slipped(paths.pieces, memory)
-            pull = -(grip * np.clip(slip / self._stick, -1.0, 1.0)) @ self._beyond  # what friction adds to the tension
+            pull = -(grip * np.clip(slip / self.stick, -1.0, 1.0)) @ self._beyond  # what friction adds to the tension
             arms = paths.piece_arms
             slips = self._beyond @ arms
-            sticking = np.where(np.abs(slip) <= self._stick, grip / self._stick, 0.0)
-            energy += float(grip @ _dissipated(np.abs(slip), self._stick))
+            sticking = np.where(np.abs(slip) <= self.stick, grip / self.stick, 0.0)
+            energy += float(grip @ _dissipated(np.abs(slip), self.stick))
             torque += pull @ arms
             stiffness += paths.stiffening(pull) + slips.T @ (sticking[:, None] * slips)
         return energy, torque, stiffness
@@ -153,16 +157,25 @@ class DryFriction:
         if not self.guided:
             return shares, torques
         paths = self._paths.at(strains)
-        slips = np.clip(self._slipped(paths.pieces, memory) / self._stick, -1.0, 1.0)
+        slips = np.clip(self._slipped(paths.pieces, memory) / self.stick, -1.0, 1.0)
         pulls = -grip[:, None] * self._beyond @ paths.piece_arms
         return np.concatenate([shares, slips]), np.concatenate([torques, pulls])
 
     def sticks(self, strains: FloatArray, memory: FrictionMemory) -> bool:
-        """Return whether nothing slips at strains, shape (count,)."""
+        """Return whether nothing slips at strains, shape (count,); what has slipped and stands still does not."""
         apart = np.linalg.norm(strains[self.places] - memory.bending, axis=1)
-        if self.guided and np.any(np.abs(self._slipped(self._paths.at(strains).pieces, memory)) > self._stick):
+        if self.guided and np.any(np.abs(self._slipped(self._paths.at(strains).pieces, memory)) > _STILL * self.stick):
             return False
-        return not np.any(apart > BENDING_STICK)
+        return not np.any(apart > _STILL * BENDING_STICK)
+
+    @property
+    def beyond_at_rest(self) -> FloatArray:
+        """Length beyond each guide at rest, beyond that where all strains are zero, shape (n_guides,) [m]."""
+        return np.asarray(self._beyond @ (self.untouched.pieces - self._paths.length))
+
+    def anchors(self, memory: FrictionMemory) -> FloatArray:
+        """Return the length beyond each guide at which its slider stands, beyond that at rest, shape (n_guides,) [m]."""
+        return self._slipped(self.untouched.pieces, memory) if self.guided else np.zeros(0)
 
     def _slipped(self, pieces: FloatArray, memory: FrictionMemory) -> FloatArray:
         """Displacement of the actuators from the sliders of their guides, shape (n_guides,) [m]."""

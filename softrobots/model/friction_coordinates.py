@@ -26,7 +26,8 @@ MOST_ROUNDS = 60
 SAME_FRICTION = 1e-13
 """Change of that friction that is none, relative to the largest load on an actuator."""
 
-_RUNAWAY = 1e6  # change that it does not come back from, likewise
+RUNAWAY = 1e6
+"""Change that it does not come back from, likewise."""
 
 FrictionLaw = Callable[[FloatArray], tuple[float, FloatArray, FloatArray]]
 """Energy [J], torque on the strains, shape (count,), and its derivative, of strains, shape (count,)."""
@@ -44,11 +45,13 @@ class FrictionCoordinates:
         """Friction of each guide that slips, shape (n_guides,) [N]."""
         self.slides = False
         """Whether the derivatives are those of slip everywhere where nothing slips."""
+        self.slips = False
+        """Whether they always are."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> FrictionPoint:
         """Return the robot at given coordinates."""
         energy, torque, stiffness = self.friction.at(elastic, self.memory, self.grip)
-        if self.slides and self.friction.sticks(elastic, self.memory):
+        if self.slips or (self.slides and self.friction.sticks(elastic, self.memory)):
             stiffness = np.zeros_like(stiffness)
         return FrictionPoint(self.inner.at(motors, elastic), energy, torque, stiffness, float(self.grip.sum()))
 
@@ -169,10 +172,10 @@ def friction_of(model: SoftModel, strains: FloatArray) -> tuple[FloatArray, Floa
     return at.friction.parts(strains, at.memory, at.grip)
 
 
-def slipping(model: SoftModel) -> SoftModel:
-    """Return the robot with the derivatives of slip where nothing slips, by which a search leaves such a state."""
+def slipping(model: SoftModel, *, always: bool = False) -> SoftModel:
+    """Return the robot with the derivatives of slip where nothing slips, by which a search leaves such a state, or always."""
     last = _rubbing(model.coordinates)
-    return _rubbed(model, last.memory, last.grip, slides=True)
+    return _rubbed(model, last.memory, last.grip, slides=True, slips=always)
 
 
 def with_given_friction(model: SoftModel, law: FrictionLaw) -> SoftModel:
@@ -197,7 +200,7 @@ def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: Fl
         grip = last.friction.grip(model.structure.strains(motors, elastic), tensions, last.memory)
         change = float(np.abs(grip - last.grip).max(initial=0.0))
     largest = float(np.abs(loads).max(initial=0.0))
-    if not change <= _RUNAWAY * largest:
+    if not change <= RUNAWAY * largest:
         return model, math.inf
     return _rubbed(model, last.memory, grip), change / max(largest, 1e-300)
 
@@ -227,10 +230,10 @@ def _rubbing(coordinates: Any) -> FrictionCoordinates:
     return coordinates if isinstance(coordinates, FrictionCoordinates) else _rubbing(coordinates.inner)
 
 
-def _rubbed(model: SoftModel, memory: FrictionMemory, grip: FloatArray, slides: bool = False) -> SoftModel:
+def _rubbed(model: SoftModel, memory: FrictionMemory, grip: FloatArray, slides: bool = False, slips: bool = False) -> SoftModel:
     """The robot with other coordinates with friction."""
     changed = copy.copy(_rubbing(model.coordinates))
-    changed.memory, changed.grip, changed.slides = memory, grip, slides
+    changed.memory, changed.grip, changed.slides, changed.slips = memory, grip, slides, slips
     return replace(model, coordinates=_around(model.coordinates, changed))
 
 

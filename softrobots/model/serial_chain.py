@@ -14,6 +14,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.description.urdf_tags import ActuatorTag
+from softrobots.model.dry_friction import DryFriction
 from softrobots.model.muscle_paths import MusclePaths
 
 
@@ -137,6 +138,8 @@ class SerialChain:
     """First and last joint of each lumped section that has dry friction or along which an actuator winds, base to tip."""
     friction: tuple[tuple[int, int, float], ...] = ()
     """The two strains of bending of each section with dry friction, and the moment of that [N m]."""
+    guides: DryFriction | None = None
+    """The dry friction of actuators in their guides, one a path; None without it."""
 
     @cached_property
     def joined(self) -> SerialChain:
@@ -162,8 +165,10 @@ class SerialChain:
     def routed(self) -> bool:
         """Whether an actuator is not of given length or tension, winds, or passes other sections than those it overlaps.
 
-        Also where lengths constrain other combinations of strains than sums, or lumped sections have dry friction.
+        Also where lengths constrain other combinations of strains than sums, or guides or lumped sections have dry friction.
         """
+        if self.guides is not None:
+            return True
         if self.actuators and any(isinstance(self.elements[self.element_of[one]], _LUMPED) for one, *_ in self.friction):
             return True
         if any(one.kind not in ("length", "tension") or not one.straight for one in self.actuators):

@@ -128,7 +128,8 @@ def rubbing_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
         change, rounds = math.inf if model.structure.guided else 0.0, 0
         while change > SAME_FRICTION and rounds < MOST_ROUNDS:
             model, change = gripped(model, q_motors, q_springs, state.load.motors)
-            state, rounds = _evaluated(model, q_motors, q_springs, load), rounds + 1
+            if change > SAME_FRICTION:
+                state, rounds = _evaluated(model, q_motors, q_springs, load), rounds + 1
         return model, state if change <= SAME_FRICTION else state._replace(error=math.inf)
 
 

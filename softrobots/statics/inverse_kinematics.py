@@ -107,7 +107,8 @@ def solve_ik(
     the change is minimal; if it has muscles, the first search that succeeds decides, as it does among obstacles. Where
     muscles cannot both pull and push (a least tension of zero or more), the limits of all tensions are kept, too, and
     redundant ones get the least tension instead: a minimum of the sum of squares beyond their pretension
-    (`statics.tip_steps`), also where lengths are given (`statics.tip_goal.LoadedTip.begin`).
+    (`statics.tip_steps`), also where lengths are given (`statics.tip_goal.LoadedTip.begin`). The lengths of given tensions
+    may be beyond their limits, which `Equilibrium.within_limits` tells.
 
     For full poses of a robot with a spherical wrist the arm first puts the centre of the wrist in place, and the wrist starts
     in the orientation, with both of its solutions (`statics.spherical_wrist`).

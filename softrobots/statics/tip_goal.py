@@ -159,7 +159,7 @@ class LoadedTip:
         if not np.array_equal(taut, q_motors):
             return self.solve(taut, state.q_springs)
         if self.model.structure.friction is not None:  # where it sticks, the tip would not move at all
-            state = elastic_state(slipping(self.model), q_motors, state.q_springs, self.load)
+            state = elastic_state(slipping(state.model), q_motors, state.q_springs, self.load)
         translation, turn = self.goal.missing(self.model, state.q)
         return LocalSolution(q_motors, state, float(np.linalg.norm(translation)), float(np.linalg.norm(turn)), excess)
 
@@ -194,11 +194,15 @@ class LoadedTip:
         motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
         return tip_motion(self.model, motors, springs, state.tangent, state.load.coupling, pressed_gaps(state))
 
-    def released(self, state: ElasticState, held: TipModel, damping: float) -> list[TipModel]:
+    def released(self, here: LocalSolution[ElasticState], held: TipModel, damping: float) -> list[TipModel]:
         """Return the models in which pressed contacts open, see `softrobots.statics.tip_goal`."""
+        state = here.state
         pressed = pressed_gaps(state)
         if pressed is None:
-            return []
+            if self.model.structure.friction is None:
+                return []
+            slips = elastic_state(slipping(state.model, always=True), here.q_motors, state.q_springs, self.load)
+            return [TipModel(held.missing, *self.motion(slips), held.shift)]
         motors, springs = state.point.columns(self.goal.jacobian(self.model, state.q))
         return released(state, pressed, motors, springs, held, damping)
 

@@ -14,7 +14,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.tip_steps import Pull, TipModel, step_home, step_within
+from softrobots.statics.tip_steps import LeastTension, Pull, TipModel, pace_of, step_home, step_within
 
 POSITION_TOLERANCE = 1e-9
 """Default tolerance of the position of the tip [m]."""
@@ -111,7 +111,7 @@ class SoughtTip(Protocol[State]):
             NeutralEquilibrium: If the tangent stiffness is singular.
         """
 
-    def released(self, state: State, held: TipModel, damping: float) -> list[TipModel]:
+    def released(self, here: LocalSolution[State], held: TipModel, damping: float) -> list[TipModel]:
         """Return the models in which contacts open that `held` keeps, if a step with this damping opens them."""
 
     def pull(self, state: State, follow: FloatArray) -> Pull | None:
@@ -156,15 +156,16 @@ def search(
     mu, redundant, unsolved, pace = damping * model.reach, basis.shape[1] > tip.rows, 0, 1.0
     home = q_motors if home is None else home
     last: tuple[FloatArray, FloatArray] | None = None  # last step and drift
-    refused = 0  # models of this state whose step did not lead nearer
+    rubs, least = model.structure.friction is not None, LeastTension(here)
+    refused, ease = 0, 0.1  # models of this state whose step did not lead nearer; change of the damping after one that does
     reached: LocalSolution[State] | None = None  # the last solution at the goal
     for iteration in range(1, max_iterations + 1):
         arrived = here.arrived(tolerance)
         try:
-            models = tip_models(tip, here.state, arrived)
+            models = tip_models(tip, here, arrived)
         except NeutralEquilibrium:
             break
-        missing, slope, follow, shift = models[min(refused, len(models) - 1)]
+        missing, slope, follow, shift = near = models[min(refused, len(models) - 1)]
         slope = slope @ basis
         if reached is not None and _apart(model, here.q_motors, home) > farthest:
             here = reached
@@ -180,11 +181,14 @@ def search(
             towards, drift = step_within(model, here.q_motors, slope, missing, mu, pulled, reached is not None)
             nearer = float(np.linalg.norm(slope @ towards))
             stationary = nearer <= 1e-6 * float(np.linalg.norm(missing)) and pulled.excess <= TENSION_TOLERANCE
+        if rubs and pulled is not None and reached is not None and least.turns(here if arrived else None, pulled):
+            here = least.best
+            break
         if arrived and float(np.abs(drift).max()) <= SAME:
             return replace(here, iterations=iteration - 1, unsolved=unsolved)
         # Where limits stop one of the two drifts, their difference tells nothing of the valley.
         if last is not None and (pulled is None or min(np.abs(last[1]).max(), np.abs(drift).max()) > SAME):
-            pace = _pace(*last, drift)
+            pace = pace_of(*last, drift)
         miss, last = here.miss(model), None
         if not arrived and stationary:
             refused += 1
@@ -197,18 +201,24 @@ def search(
         guess = here.state.q_springs + shift + follow @ (moved - here.q_motors)
         there = tip.solve(moved, guess)
         unsolved += there is None
+        if rubs and not arrived and there is not None and there.miss(model) >= miss:  # the way of the tip is bent
+            aside = near._replace(missing=tip.missing(there.state)).step(basis, max(mu, _LAST_DAMPING * model.reach))
+            aside *= min(1.0, float(np.linalg.norm(basis @ step)) / max(float(np.linalg.norm(aside)), 1e-300))
+            again = model.actuators.go(there.q_motors, aside)
+            there = tip.solve(again, there.state.q_springs + follow @ (again - there.q_motors))
         # Drifting home costs distance in second order, which the next step corrects.
         drifted = pace * float(np.linalg.norm(drift))
         allowed = max(10.0 * tolerance, model.reach * min(4.0 * drifted**2, _NEAR)) if going_home else 0.0
         if there is not None and (there.miss(model) < miss or there.miss(model) <= allowed):
-            here, mu, last = there, 0.1 * mu if mu > _LAST_DAMPING * model.reach else 0.0, (step, drift)
-            refused = 0
+            here, mu, last = there, ease * mu if mu > _LAST_DAMPING * model.reach else 0.0, (step, drift)
+            refused, ease = 0, 0.1
         elif drifted > float(np.linalg.norm(towards)):
             pace *= 0.5
         elif refused + 1 < len(models):
             refused += 1
         else:
-            mu = max(10.0 * mu, 10.0 * _LAST_DAMPING * model.reach)
+            mu = max((3.0 if rubs else 10.0) * mu, 10.0 * _LAST_DAMPING * model.reach)
+            refused, ease = (0, 1.0) if rubs else (refused, ease)
             if mu > 1e6 * model.reach:
                 break
     ended = here if reached is None or here.arrived(tolerance) else reached
@@ -238,7 +248,7 @@ def advance(
     """
     there = tip.towards(target)
     try:
-        models = tip_models(there, here.state)
+        models = tip_models(there, here)
     except NeutralEquilibrium:  # about to buckle: there is no linear prediction
         return None
     actuators = tip.model.actuators
@@ -264,7 +274,7 @@ def advance(
     return None if half is None else advance(tip, middle, target, half, tolerance, halvings - 1)
 
 
-def tip_models(tip: SoughtTip[State], state: State, arrived: bool = False) -> list[TipModel]:
+def tip_models(tip: SoughtTip[State], here: LocalSolution[State], arrived: bool = False) -> list[TipModel]:
     """Return the models about a state, that in which a damped step leaves least to the goal first.
 
     In free space there is one. A tip that leans on an obstacle cannot leave it by a small step: that takes as much of the
@@ -273,25 +283,18 @@ def tip_models(tip: SoughtTip[State], state: State, arrived: bool = False) -> li
     Raises:
         NeutralEquilibrium: If the tangent stiffness is singular.
     """
-    slope, follow = tip.motion(state)
-    held = TipModel(tip.missing(state), slope, follow, np.zeros(len(follow)))
+    slope, follow = tip.motion(here.state)
+    held = TipModel(tip.missing(here.state), slope, follow, np.zeros(len(follow)))
     damping, basis = _FIRST_DAMPING * tip.model.reach, tip.model.actuators.basis
-    others = [] if arrived else tip.released(state, held, damping)
-    if not others:
-        return [held]
+    others = [] if arrived else tip.released(here, held, damping)
 
     def left(one: TipModel) -> float:
         return float(np.linalg.norm(one.missing - one.slope @ one.step(basis, damping)))
 
-    return sorted([held, *others], key=left)
+    rubs = tip.model.structure.friction is not None  # what sticks there is let slip only where nothing else leads nearer
+    return [held, *others] if rubs else sorted([held, *others], key=left)
 
 
 def _apart(model: SoftModel, one: FloatArray, other: FloatArray) -> float:
     """Largest difference of an actuator relative to its scale [rad]."""
     return float(np.abs((one - other) / model.motor_scale).max())
-
-
-def _pace(step: FloatArray, last_drift: FloatArray, drift: FloatArray) -> float:
-    """Length of the drift: the step length of Barzilai and Borwein, which converges in narrow valleys, too."""
-    bent = float(step @ (last_drift - drift))
-    return float(np.clip(float(step @ step) / bent, 0.1, 100.0)) if bent > 0.0 else 100.0 if step.any() else 1.0

@@ -14,7 +14,8 @@ Where the steps end, the conditions of Karush, Kuhn and Tucker of the least tens
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from dataclasses import dataclass
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -24,6 +25,8 @@ from softrobots.model.soft_model import SoftModel
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.0)  # of a violated limit that a step may take back
 _LEAST_DAMPING = 1e-7  # of a step, relative to the largest slope
 _ROUNDING = 1e-12  # of limits, in units of scaled actuators
+_IDLE = 20  # steps of a drift that do not lessen tensions, after which it ends
+_SAME_SIZE = 1e-6  # of the sum of squares of tensions, relative to it
 
 
 class TipModel(NamedTuple):
@@ -118,6 +121,30 @@ def step_within(
     goal = np.concatenate([-(pulled.beyond + felt @ towards), np.zeros(null.shape[1])])
     turn = least_squares(lessened, goal, ends @ null, np.maximum(allowed - ends @ towards, 0.0))
     return towards, still if turn is None else null @ turn
+
+
+@dataclass
+class LeastTension:
+    """Drift of a robot with dry friction to its least tensions: at the kinks of friction it can turn for ever."""
+
+    best: Any
+    """Solution at the goal with the least tensions so far."""
+    _size: float = np.inf
+    _idle: int = 0
+
+    def turns(self, arrived: Any, pulled: Pull) -> bool:
+        """Return whether many steps have not lessened the tensions; `arrived` is a solution at the goal, or None."""
+        size = float(pulled.beyond @ pulled.beyond)
+        self._idle += 1
+        if arrived is not None and size < self._size:
+            self.best, self._size, self._idle = arrived, size * (1.0 - _SAME_SIZE), 0
+        return self._idle > _IDLE
+
+
+def pace_of(step: FloatArray, last_drift: FloatArray, drift: FloatArray) -> float:
+    """Return the length of a drift: the step of Barzilai and Borwein, which converges in narrow valleys, too."""
+    bent = float(step @ (last_drift - drift))
+    return float(np.clip(float(step @ step) / bent, 0.1, 100.0)) if bent > 0.0 else 100.0 if step.any() else 1.0
 
 
 def step_home(

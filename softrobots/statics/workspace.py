@@ -89,7 +89,8 @@ def sample_workspace(
 
     Actuator coordinates are uniform within their limits (muscle lengths of a segment are projected to consistent ones), with
     the robot in equilibrium under the load at each. Where muscles cannot both pull and push, only samples within the limits
-    of all tensions count, as for `solve_ik`; with lengths given, tensions are drawn, which hardly any of the lengths has.
+    of all tensions count, as for `solve_ik`; with lengths given, tensions are drawn, which hardly any of the lengths has. With
+    tensions given, limits of lengths do not count.
 
     Args:
         model: The robot, with at least one actuator.

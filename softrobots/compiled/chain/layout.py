@@ -36,7 +36,7 @@ torque that the force does not explain; squared smallest singular value of the e
 
 
 # No places for callers.
-_COUNTS = ("unknowns", "conditions", "muscles", "constraints", "inputs", "rubbing", "singles", "numbers", "prepared")
+_COUNTS = ("unknowns", "conditions", "muscles", "constraints", "inputs", "rubbing", "guides", "singles", "numbers", "prepared")
 
 
 def assign_places(layout: Any, first: int, **sizes: int) -> None:
@@ -63,7 +63,9 @@ class Layout:
     inputs: int = 0
     """Number of numbers of the robot that are inputs of its code, see `numbers.NumberInputs`."""
     rubbing: int = 0
-    """Number of unknowns of a robot with dry friction of bending; 0 for others."""
+    """Number of unknowns of a robot with dry friction; 0 for others."""
+    guides: int = 0
+    """Number of guides of actuators that rub."""
     force: int = field(init=False)
     """Force on the tip, world axes [N] (3)."""
     gravity: int = field(init=False)
@@ -106,6 +108,12 @@ class Layout:
     """Where the sliders of dry friction stand before the step, at the places of the unknowns that they hold [rad]."""
     slid: int = field(init=False)
     """Where they stand after it [rad]."""
+    anchors: int = field(init=False)
+    """Length beyond each guide at which its slider stands before the step, beyond that at rest [m]."""
+    anchored: int = field(init=False)
+    """The same after it [m]."""
+    grips: int = field(init=False)
+    """Friction of each guide that slips [N]."""
     prepared: int = field(init=False)
     """Values that depend on motors, load and numbers of the robot only; as many places as the code needs."""
 
@@ -118,7 +126,8 @@ class Layout:
         )
         points = dict(next_point=point, previous=point, predicted=point, correction=point)
         searches = dict(tip=3, torques=motors, target=self.target_size, next_target=self.target_size)
-        rest = dict(singles=len(SINGLES), numbers=self.inputs, sliders=self.rubbing, slid=self.rubbing, prepared=0)
+        guides = dict(anchors=self.guides, anchored=self.guides, grips=self.guides)
+        rest = dict(singles=len(SINGLES), numbers=self.inputs, sliders=self.rubbing, slid=self.rubbing, **guides, prepared=0)
         assign_places(self, motors, force=3, gravity=3, **before_tip, **searches, **points, **rest)
 
     @property
@@ -137,8 +146,8 @@ class Layout:
 
     def constants(self) -> dict[str, int]:
         """Return the places by their names in generated code."""
-        sliders = () if self.rubbing else ("sliders", "slid")
-        places = {name.upper(): place for name, place in vars(self).items() if name not in (*_COUNTS, *sliders)}
+        absent = [*(() if self.rubbing else ("sliders", "slid")), *(() if self.guides else ("anchors", "anchored", "grips"))]
+        places = {name.upper(): place for name, place in vars(self).items() if name not in (*_COUNTS, *absent)}
         places |= {name.upper(): self.single(name) for name in SINGLES}
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
 

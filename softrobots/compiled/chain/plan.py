@@ -46,8 +46,9 @@ class Plan:
         """Places of the numbers of a case."""
         unknowns, conditions = self.unknowns, 6 if self.poses else 3
         counts = unknowns.n_tensions, unknowns.n_constraints, 0 if self.inputs is None else self.inputs.count
-        rubbing = len(unknowns.strains) if unknowns.chain.friction else 0
-        return Layout(unknowns.chain.n_motors, len(unknowns.strains), conditions, *counts, rubbing)
+        guides = 0 if unknowns.chain.guides is None else unknowns.chain.guides.n_guides
+        rubbing = len(unknowns.strains) if unknowns.chain.friction or guides else 0
+        return Layout(unknowns.chain.n_motors, len(unknowns.strains), conditions, *counts, rubbing, guides)
 
     @cached_property
     def recursion(self) -> RecursionLayout:

@@ -14,10 +14,14 @@ import numpy as np
 
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.unknowns import Segment, Unknowns
+from softrobots.model.dry_friction import DryFriction
 from softrobots.model.serial_chain import strains_of
 
 POINT_RECORD = 4
 """Numbers kept of a point: components of its direction, and one over its length."""
+GUIDE_RECORD = 6
+"""Numbers kept of a guide behind those: change of its piece, tension, coupling with what is beyond and with itself, share of
+its friction, and the second component of the slope."""
 
 
 class Beside(NamedTuple):
@@ -66,6 +70,8 @@ class Routes:
     """Tension of each actuator of the robot [N]."""
     tensions: int = field(init=False)
     """Tension of each actuator of the segment [N] (M)."""
+    stretching: int = field(init=False)
+    """With guides that rub: its derivative by the length [N/m] (M)."""
     load: int = field(init=False)
     """Sum of tensions times slopes of the lengths, of an element."""
     curvature: int = field(init=False)
@@ -98,6 +104,8 @@ class Routes:
     """How much the steps nearer to the base lengthen the actuators, of each side (4, c) [m]."""
     slopes: int = field(init=False)
     """Slope of the length of each numbered actuator beside each element, k each."""
+    weighted: int = field(init=False)
+    """With guides that rub: change of the tension beyond by each unknown, in the order of `slopes` [N/rad or N/m]."""
     meetings: int = field(init=False)
     """`L^-1 C^T` of the components of each element, k each."""
     points: int = field(init=False)
@@ -115,13 +123,34 @@ class Routes:
             load=k, curvature=k * (k + 1) // 2, push=3 * k, own=k * (k + 1) // 2, sides=4 * k, before=4 * k, twists=3 * k
         )
         sums |= dict(lower=k * k, inverse=k, coupling=3 * k, columns=4 * k, cross=3 * c, square=c * c, sums=4 * c, turns=4 * c)
-        sizes = dict(margin=1, lengths=muscles, changes=robot, pulled=robot, tensions=muscles) | sums
-        rest = dict(slopes=sum(map(self.rows, rows)) * k, meetings=sum(map(self.past, rows)) * k)
-        rest["points"] = POINT_RECORD * sum(len(one.paths) for row in rows for one in self.beside[row])
+        sizes = (
+            dict(
+                margin=1,
+                lengths=muscles,
+                changes=robot,
+                pulled=robot,
+                tensions=muscles,
+                stretching=muscles if self.guided else 0,
+            )
+            | sums
+        )
+        slopes = sum(map(self.rows, rows)) * k
+        rest = dict(slopes=slopes, weighted=slopes if self.guided else 0, meetings=sum(map(self.past, rows)) * k)
+        rest["points"] = self.record * sum(len(one.paths) for row in rows for one in self.beside[row])
         if rows:
             assign_places(self, self.first, **sizes, **rest, end=0)
         else:
             object.__setattr__(self, "end", self.first)
+
+    @property
+    def guided(self) -> bool:
+        """Whether actuators rub in their guides, one a point of a route."""
+        return self.unknowns.chain.guides is not None
+
+    @property
+    def record(self) -> int:
+        """Count of numbers kept of a point."""
+        return POINT_RECORD + (GUIDE_RECORD if self.guided else 0)
 
     @property
     def segments(self) -> list[Segment]:
@@ -156,11 +185,12 @@ class Routes:
 
     def tables(self) -> dict[str, object]:
         """Return the tables of the loops."""
-        count = len(self.unknowns.chain.elements)
+        count, chain = len(self.unknowns.chain.elements), self.unknowns.chain
         beside = [self.beside.get(row, ()) for row in range(count)]
         pairs, k = [one for row in beside for one in row], self.stride
         rows, past = ([size(row) if row in self.beside else 0 for row in range(count)] for size in (self.rows, self.past))
-        return {
+        tables = {} if chain.guides is None else self._guide_tables(chain.guides)
+        return tables | {
             "FIRST_BESIDE": (0, *accumulate(len(one) for one in beside)),
             "FIRST_POINT": (0, *accumulate(len(one.paths) for one in pairs)),
             "NUMBER": tuple(one.number for one in pairs),
@@ -170,10 +200,37 @@ class Routes:
             "MEETINGS": tuple(accumulate((k * size for size in past[:-1]), initial=self.meetings)),
             "STRIDE": k,
             "POINTS": self.points,
-            "POINT_RECORD": POINT_RECORD,
+            "POINT_RECORD": self.record,
             "N_COMPONENTS": self.components,
             "COMPONENT_PUSH": self.cross,
             "COMPONENT_SQUARE": self.square,
+        }
+
+    def _guide_tables(self, friction: DryFriction) -> dict[str, object]:
+        """Return the tables of `guides.RUB` and of `guide_drivers`; guides are in the order of the paths of the actuators."""
+        chain, segments = self.unknowns.chain, self.unknowns.segments
+        paths = chain.muscle_paths
+        point = {path: number for number, (_, path) in enumerate(self.paths())}
+        places = np.array([[self.unknowns.place.get(one, -1) for one in row] for row in paths.places.tolist()])
+        strains = np.append(chain.rest, 0.0)[paths.places]
+        turned, slope = friction.turns
+        rest = turned + (slope @ np.where(places < 0, strains, 0.0)[:, None, :, None])[..., 0]
+        slope = np.where((places < 0)[:, None, None], 0.0, slope)
+        return {
+            "FIRST_RUBBING": (0, *accumulate(len(one.muscles) for one in segments)),
+            "RUBBING": tuple(muscle for one in segments for muscle in one.muscles),
+            "N_RUBBING": len(chain.actuators),
+            "FIRST_GUIDE": (*paths.starts.tolist(), len(paths.muscle)),
+            "GUIDE_AT": tuple(self.points + self.record * point[one] + POINT_RECORD for one in range(len(point))),
+            "GUIDE_STICK": tuple(friction.stick.tolist()),
+            "GUIDE_REST": tuple(friction.beyond_at_rest.tolist()),
+            "GUIDE_COEFFICIENT": tuple(friction.coefficient.tolist()),
+            "GUIDE_STRAIN": tuple(np.maximum(places, 0).ravel().tolist()),
+            "GUIDE_TURN": tuple(np.concatenate([rest[..., None], slope], axis=-1).ravel().tolist()),
+            "STRETCHING": self.stretching,
+            "TENSIONS": self.tensions,
+            "PULLED": self.pulled,
+            "WEIGHTED": self.weighted - self.slopes,
         }
 
     def _beside(self, row: int) -> tuple[Beside, ...]:

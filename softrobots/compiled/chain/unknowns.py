@@ -39,7 +39,7 @@ class Segment(NamedTuple):
     muscles: tuple[int, ...]
     """Its muscles; with `Unknowns.routed` those first whose tension depends on the length, from the tip on."""
     stretched: tuple[int, ...] = ()
-    """Those whose tension depends on the length; with `Unknowns.held_lengths` all."""
+    """Those whose tension depends on the length; with `Unknowns.held_lengths`, or guides that rub, all."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,7 +108,8 @@ class Unknowns:
         groups = tuple(
             number for number, group in enumerate(chain.constrained) if first <= self.chain.element_of[group[0]] <= last
         )
-        stretched = tuple(one for one in muscles if self.held_lengths or chain.actuators[one].kind in STRETCHED)
+        whole = self.held_lengths or chain.guides is not None
+        stretched = tuple(one for one in muscles if whole or chain.actuators[one].kind in STRETCHED)
         ordered = [*stretched, *(one for one in muscles if one not in stretched)] if self.routed else sorted(muscles)
         return Segment(first, last, groups, tuple(ordered), stretched)
 

@@ -93,16 +93,16 @@ def outcome(w: Array) -> int:
     return CERTIFIED
 
 
-def search_line(w: Array, longest: float) -> bool:
+def search_line(w: Array, longest: float, least: float) -> bool:
     """Search along the step for a lower energy (Armijo); tell whether it or the residual decreased.
 
     The step is doubled while the energy falls and it stays shorter than `longest`. With given muscle lengths the energy counts
     their gap to second order only, and near the equilibrium its own decrease is smaller than that: there a Newton step at a
-    stable point is taken, too, if it halves the residual.
+    stable point is taken, too, if it halves the residual; all that were before, whose `least` is squared, as it may rise again.
     """
     halved = 0.0
     if N_CONSTRAINTS > 0 and is_stable(w):
-        halved = 0.25 * w[ERROR]
+        halved = 0.25 * least
     keep(w)
     energy = w[ENERGY]
     slope = w[SLOPE]
@@ -165,6 +165,7 @@ def descend(w: Array) -> int:
     unless there is none, a section comes to the end of its range, or the largest number of steps is reached. Where it is
     nearly neutral the residual is made as small as it can be: the least pivot is as far from its value as that from zero.
     """
+    least = 1e300
     saddles = 0
     refined = 0
     strong = 0
@@ -196,7 +197,9 @@ def descend(w: Array) -> int:
                 w[PIVOT_SHIFT] = 0.0
                 if w[LENGTH] < SHORT_STEP * SHORT_STEP:
                     longest = LARGEST_STEP
-            if not search_line(w, longest):
+            if w[ERROR] < least:
+                least = w[ERROR]
+            if not search_line(w, longest, least):
                 if stable:
                     if not cross_valley(w):
                         break

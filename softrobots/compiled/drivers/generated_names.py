@@ -22,6 +22,8 @@ N: int
 N_MOTORS: int
 N_CONSTRAINTS: int
 N_SLIDERS: int
+N_GUIDES: int
+N_RUBBING: int
 N_STARTS: int
 N_INPUTS: int
 N_MUSCLES: int
@@ -36,6 +38,8 @@ WORKSPACE_SIZE: int
 
 # Places in the workspace, see `softrobots.compiled.chain.layout`.
 ACTUATORS: int
+GRIPS: int
+PULLED: int
 CORRECTION: int
 DAMPING: int
 ENERGY: int
@@ -113,7 +117,12 @@ STRAIN_STIFFNESS: tuple[float, ...]
 UNKNOWN_STRAIN: tuple[int, ...]
 
 # Numbers of the robot: spring rounding [N m], reach [m], tables by unknown, motor or muscle.
+FIRST_GUIDE: tuple[int, ...]
 GROUP: tuple[int, ...]
+GUIDE_AT: tuple[int, ...]
+GUIDE_COEFFICIENT: tuple[float, ...]
+GUIDE_STRAIN: tuple[int, ...]
+GUIDE_TURN: tuple[float, ...]
 LEAST_INPUT: tuple[float, ...]
 LOWER: tuple[float, ...]
 MUSCLE_BASE: tuple[float, ...]

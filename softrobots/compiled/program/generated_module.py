@@ -16,7 +16,7 @@ from softrobots.compiled.chain.layout import Layout, TipLayout
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import equilibrium_drivers as drivers
-from softrobots.compiled.drivers import lane_drivers, motor_drivers, muscle_drivers, path_drivers, trigonometry
+from softrobots.compiled.drivers import guide_drivers, lane_drivers, motor_drivers, muscle_drivers, path_drivers, trigonometry
 from softrobots.compiled.program.looped_program import looped_program
 from softrobots.compiled.program.manual import manual
 from softrobots.compiled.program.motor_program import force_blocks, target_blocks
@@ -75,6 +75,12 @@ def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False, input
         tables |= parts.constants
         tip, entries = parts.tip, [*entries, "look_at_tip"]
         loops, lane_loops = [parts.loops()], [parts.loops("_lanes")]
+    if layout.guides:  # cases are solved one by one
+        own = functions_of(guide_drivers)
+        names_of_own = [one.__name__ for one in own]
+        functions = [one for one in functions if one.__name__ not in names_of_own] + own[:-1]
+        lanes, lane_loops = [], []
+        lane_functions = [lane_drivers.load_case, lane_drivers.store_case, guide_drivers.settle_batch]
     if unknowns.moved_by_motors:
         by_force, size = force_blocks(plan, size)
         by_target = target_blocks(plan)
@@ -82,7 +88,7 @@ def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False, input
         blocks = blocks + by_force + by_target
         lanes = [*lanes, by_force[1], by_force[2], by_target[1]]
         functions += functions_of(motor_drivers) + functions_of(path_drivers)
-    else:
+    elif not layout.guides:
         lane_functions = [one for one in lane_functions if one not in lane_drivers.MOTOR_FUNCTIONS]
     responses = None
     if inputs is not None:
@@ -140,6 +146,7 @@ def _constants(unknowns: Unknowns, layout: Layout, size: int, lane_size: int, ta
         "N_CONSTRAINTS": unknowns.n_constraints,
         "N_STARTS": layout.unknowns if unknowns.n_constraints or layout.inputs else 0,
         "N_SLIDERS": layout.rubbing,
+        "N_GUIDES": layout.guides,
         "N_INPUTS": unknowns.n_tensions,
         "LEAST_INPUT": unknowns.least_inputs,
         **{status.name: status.value for status in Status},

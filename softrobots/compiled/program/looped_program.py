@@ -17,7 +17,7 @@ from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.looped_frame import looped_frame
 from softrobots.compiled.routes.ends import held_blocks, keep_lengths, leave_segment, start_lengths
-from softrobots.compiled.routes.loops import LENGTHS, PULLS, around, components_text, loops_of
+from softrobots.compiled.routes.loops import LENGTHS, PULLS, RUB, around, components_text, guided, loops_of
 from softrobots.compiled.routes.terms import component_blocks, form_of, length_blocks, route_forms
 from softrobots.compiled.trace.blocks import Block
 
@@ -48,7 +48,12 @@ class LoopedProgram:
         passes = [name for name in self.calls if not suffix or name in _PASSES]
         routes = [loops_of(*loop, suffix) for loop in self.route_loops[0] + ([] if suffix else self.route_loops[1])]
         control = (RESPONSE_CONTROL if self.tip.given else _CONTROL).replace("_SUFFIX", suffix)
-        texts = [*routes, *(self._loop(name, suffix) for name in passes), control]
+        texts = [
+            *([RUB] if "GUIDE_AT" in self.constants else []),
+            *routes,
+            *(self._loop(name, suffix) for name in passes),
+            control,
+        ]
         return "\n\n\n".join(texts if suffix or self.tip.given else [*texts, TIP_CONTROL])
 
     def _loop(self, name: str, suffix: str) -> str:
@@ -128,7 +133,7 @@ def looped_program(plan: Plan) -> LoopedProgram:
     tip_blocks, tip_sequence, size = _sequence(tip_plan, element_kinds(tip_plan), tip.end, calls)
     constants = _constants(plan, kinds, sequence) | tip.constants() | {"AT_TIP": tuple(at for _, at, *_ in tip_sequence)}
     route_blocks, loops, tables = _along_routes(plan)
-    components, tip_loops = components_text(held=unknowns.held_lengths), []
+    components, tip_loops = components_text(held=unknowns.held_lengths, rubbing=plan.routes.guided), []
     for name, form in route_forms(plan).items():
         tip_blocks += component_blocks(tip_plan, name, form)
         tip_loops.append((components, f"tip_{name}"))
@@ -154,6 +159,7 @@ def _constants(plan: Plan, kinds: Sequence[Kind], sequence: Sequence[_Step]) -> 
     """Return the tables of the elements, and the bounds of the loops."""
     end = plan.recursion.end
     constants: dict[str, object] = {"FIRST": end + 1, "COUNT": end + 2, "N_ELEMENTS": len(sequence)}
+    constants |= {"GUIDE_ENERGY": plan.recursion.sums} if plan.routes.guided else {}
     constants |= {f"TABLE_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
     steps = dict(zip(("KIND", "AT", "ROW", "PLACE", "ELEMENT"), zip(*sequence, strict=True), strict=True))
     return constants | {name: values for name, values in steps.items() if name != "ELEMENT" or plan.unknowns.routed}
@@ -164,12 +170,13 @@ def _along_routes(plan: Plan) -> tuple[list[Block], list[tuple[str, str]], dict[
     blocks: list[Block] = []
     loops: list[tuple[str, str]] = []
     tables: dict[str, object] = {}
+    lengths, pulls = (guided(LENGTHS), guided(PULLS)) if plan.routes.guided else (LENGTHS, PULLS)
     for name, form in route_forms(plan).items():
         added, columns = length_blocks(plan, name, form)
         blocks += added + component_blocks(plan, name, form)
         loops += [
-            (LENGTHS.replace("POINT_WIDTH", str(columns.width)) if columns else PULLS, name),
-            (components_text(held=plan.unknowns.held_lengths), name),
+            (lengths.replace("POINT_WIDTH", str(columns.width)) if columns else pulls, name),
+            (components_text(held=plan.unknowns.held_lengths, rubbing=plan.routes.guided), name),
         ]
         if columns:
             tables |= plan.routes.tables() | {f"POINT_TABLE_{name}": tuple(columns.numbers)}
@@ -218,6 +225,8 @@ def _sequence(
             blocks += [] if infix else [keep_lengths(plan, number, segment)]
             outward_calls.append((end, f"keep_lengths_{number}(w)"))
             inward_calls.append((end, f"start_lengths_{infix}{number}(w)"))
+            if plan.routes.guided and not infix:
+                inward_calls.append((end, f"rub(w, {number})"))
             step_calls.append((end, f"leave_segment_{infix}{number}(w)"))
             if unknowns.held_lengths:
                 ends_of_segment, size = held_blocks(plan, number, segment)

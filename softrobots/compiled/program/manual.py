@@ -77,6 +77,9 @@ def _inputs(plan: Plan) -> list[Place]:
                 "sliders of dry friction, at the places of the unknowns that bend [rad]: at rest, then the last SLID",
             )
         )
+    if layout.guides:
+        meaning = "length of actuators beyond each guide at its slider, from rest [m]: 0 at first, then the last ANCHORED"
+        places.append(Place("ANCHORS", layout.guides, meaning))
     if searches:
         places.append(Place("TORQUES", layout.motors, "load on each motor, minus what it exerts [N m or N]; for estimate"))
         turned = ", and its rotation matrix, row by row" if plan.poses else ""
@@ -95,6 +98,8 @@ def _results(plan: Plan, tip: TipLayout | None) -> list[Place]:
     ]
     if plan.layout.rubbing:
         places.append(Place("SLID", n, "the sliders after the step from SLIDERS to this equilibrium [rad]"))
+    if plan.layout.guides:
+        places.append(Place("ANCHORED", plan.layout.guides, "the same lengths after that step [m]"))
     if unknowns.moved_by_motors:
         places += [
             Place("FORCE", 3, "the force [N], world axes; of estimate"),

@@ -83,7 +83,9 @@ def start_lengths(plan: Plan, number: int, segment: Segment) -> Block:
         energy = energy + pull.energy
         block.store(routes.tensions + place, pull.value)
         block.store(routes.pulled + muscle, pull.value)
-        if muscle in segment.stretched:
+        if routes.guided:
+            block.store(routes.stretching + place, pull.slope)
+        elif muscle in segment.stretched:
             square[place, place] = -pull.slope
     if plan.tip is None:
         block.store(recursion.sums, block.load(recursion.sums) + energy)

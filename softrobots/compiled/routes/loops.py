@@ -77,8 +77,73 @@ def pull_FORM(w: Array, element: int) -> None:
 """The same for elements between the parts of a route."""
 
 
-def components_text(*, held: bool) -> str:
-    """Return the loops over lengths; `held`: whether those are given, and steps do not change their multipliers."""
+CLEAR_GUIDES = """    for m in range(N_ROWS[element]):
+        clear_slopes_FORM(w, WEIGHTED + SLOPES[element] + STRIDE * m)"""
+"""What `pull` clears, too, where actuators rub in their guides."""
+
+GUIDES = """
+    for r in range(FIRST_BESIDE[element], FIRST_BESIDE[element + 1]):
+        for p in range(FIRST_POINT[r], FIRST_POINT[r + 1]):
+            point = POINTS + POINT_RECORD * p
+            add_curvature_FORM(w, POINT_WIDTH * p, NUMBER[r], point)
+            add_guide_FORM(w, POINT_WIDTH * p, WEIGHTED + SLOPES[element] + STRIDE * NUMBER[r], point)"""
+"""What these do to an element, in place of the loops of `pull`."""
+
+RUB = '''def rub(w: Array, segment: int) -> None:
+    """Find the friction of the guides of the actuators of a segment, from their lengths and the tensions of their motors."""
+    for m in range(FIRST_RUBBING[segment], FIRST_RUBBING[segment + 1]):
+        first = FIRST_GUIDE[RUBBING[m]]
+        count = FIRST_GUIDE[RUBBING[m] + 1] - first
+        number = m - FIRST_RUBBING[segment]
+        beyond = 0.0
+        for i in range(count):
+            guide = first + count - 1 - i
+            at = GUIDE_AT[guide]
+            here = beyond + 0.5 * w[at]
+            beyond += w[at]
+            slip = w[ANCHORS + guide] + GUIDE_REST[guide] - here
+            size = fabs(slip) / GUIDE_STICK[guide]
+            share = slip / GUIDE_STICK[guide]
+            work = 0.5 * size * size
+            w[at + 2] = w[GRIPS + guide] / GUIDE_STICK[guide]
+            if size > 1.0:
+                share = slip / fabs(slip)
+                work = size - 0.5
+                w[at + 2] = 0.0
+            w[at + 4] = share
+            w[GUIDE_ENERGY] += w[GRIPS + guide] * GUIDE_STICK[guide] * work
+            w[ANCHORED + guide] = here - GUIDE_REST[guide] + GUIDE_STICK[guide] * share
+        tension = w[TENSIONS + number]
+        stiffness = w[STRETCHING + number]
+        for i in range(count):
+            at = GUIDE_AT[first + i]
+            friction = w[GRIPS + first + i] * w[at + 4]
+            sticking = w[at + 2]
+            w[at + 1] = tension - 0.5 * friction
+            w[at + 2] = stiffness + 0.5 * sticking
+            w[at + 3] = stiffness + 0.25 * sticking
+            tension -= friction
+            stiffness += sticking'''
+"""Friction in guides, before the inward pass of a segment; see `softrobots.model.dry_friction`."""
+
+
+def guided(text: str) -> str:
+    """Return loops of lengths or of pulls for actuators that rub in their guides."""
+    clear = "    clear_pulls_FORM(w)"
+    head, tail = text.split(clear)
+    return f"{head}{clear}\n{CLEAR_GUIDES}{GUIDES if tail else ''}"
+
+
+def components_text(*, held: bool, rubbing: bool = False) -> str:
+    """Return the loops over lengths.
+
+    `held`: lengths are given, and steps do not change their multipliers; `rubbing`: in guides, by which they do.
+    """
+    if rubbing:
+        slopes = "SLOPES[element] + STRIDE * m"
+        begin = f"meet_own_FORM(w, WEIGHTED + {slopes}, to)"
+        text = COMPONENTS.replace("SLOPES[element]", "WEIGHTED + SLOPES[element]")
+        return text.replace(begin, f"{begin}\n        hold_length_FORM(w, {slopes}, to)")
     if not held:
         return COMPONENTS
     text = HOLD + COMPONENTS[COMPONENTS.index("def hand_on_FORM") :]

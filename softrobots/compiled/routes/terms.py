@@ -8,6 +8,13 @@ With `w` for the turn itself and `m`, `n` for lengths, an element has
 .. math:: C_w = c + P_{ww} \Omega + \sum_m P_{wm} a_m^T, \quad C_m = \Omega^T P_{wm} + \sum_n P_{mn} a_n
 
 Constant tensions need no component: they act with the slopes and second derivatives of the lengths alone.
+
+Where actuators rub in their guides (`softrobots.model.dry_friction`), a guide `g` that sticks adds the square of the length
+beyond it times :math:`\kappa_g`. Coordinates `i` nearer to the base than `j` are so coupled by
+:math:`(k_m + \sum_{g \le i} \kappa_g)\, a_i a_j`: all guides of an actuator need one component, the change of its tension from
+the base on, with `P` zero at the tip, :math:`\Omega_m = u_i`, :math:`c_m = -a_i`, and for the pieces `h` of an element
+
+.. math:: u = \sum_h w_h a_h, \quad w_h = k_m + \sum_{g < h} \kappa_g + \kappa_h / 2
 """
 
 from __future__ import annotations
@@ -17,9 +24,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import is_zero, outer, upper_triangle, vector
+from softrobots.compiled.chain.elements import constants, is_zero, outer, upper_triangle, vector
 from softrobots.compiled.chain.plan import Plan
-from softrobots.compiled.chain.routes import Routed
+from softrobots.compiled.chain.routes import POINT_RECORD, Routed
 from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.expressions import Scalar, if_less, larger, smaller, square_root
 from softrobots.model.serial_chain import strains_of
@@ -73,9 +80,10 @@ def length_blocks(plan: Routed, name: str, form: Form, swerving: int | None = No
     clear = Block(f"clear_slopes_{name}", "Clear the slopes of an actuator.", ("at",))
     clear.store_all(0, [0.0] * k, "at")
     load = Block(f"add_pull_{name}", "Add the tension of an actuator times its slopes.", ("at", "number"))
-    tension = load.load(routes.tensions, "number")
-    for place, slope in enumerate(load.loads(0, k, "at")):
-        load.store(routes.load + place, load.load(routes.load + place) + tension * slope)
+    if not routes.guided:
+        tension = load.load(routes.tensions, "number")
+        for place, slope in enumerate(load.loads(0, k, "at")):
+            load.store(routes.load + place, load.load(routes.load + place) + tension * slope)
     begin = Block(f"clear_pulls_{name}", "Clear the sums over the actuators beside an element.")
     begin.store_all(routes.load, [0.0] * k)
     begin.store_all(routes.curvature, [0.0] * (k * (k + 1) // 2))
@@ -98,11 +106,12 @@ def length_blocks(plan: Routed, name: str, form: Form, swerving: int | None = No
     bend = Block(
         f"add_curvature_{name}", "Add tension times second derivatives of a point.", ("row", "number", "point"), add.trace
     )
-    curvature = _second(form, bend, point) * bend.load(routes.tensions, "number")
+    pulling = bend.load(POINT_RECORD + 1, "point") if routes.guided else bend.load(routes.tensions, "number")
+    curvature = _second(form, bend, point) * pulling
     for place, index in enumerate(upper_triangle(k)):
         if not is_zero(curvature[index]):
             bend.store(routes.curvature + place, bend.load(routes.curvature + place) + curvature[index])
-    blocks = [clear, load, begin, add, bend]
+    blocks = [clear, load, begin, add, bend, *([_guide_block(plan, name, form, point, add)] if routes.guided else [])]
     if swerving is not None:
         turn = Block(f"add_swerve_{name}", "Add the acceleration of a length.", ("row", "q", "number", "point"), add.trace)
         rates = vector(turn.loads(0, k, "q"))
@@ -164,6 +173,30 @@ def _add_section_point(plan: Routed, form: Form, block: Block, point: _Point) ->
         block.store(place, block.load(place, "at") + slopes[axis], "at")
     block.store(routes.margin, smaller(block.load(routes.margin), either(1.0, along - point.length * SHORTEST)))
     block.store_all(0, [direction[0], either(0.0, direction[1]), direction[2], back], "point")
+    if routes.guided:
+        block.store(POINT_RECORD, ahead + excess, "point")
+        block.store(POINT_RECORD + 5, direction[1], "point")
+
+
+def _guide_block(plan: Routed, name: str, form: Form, point: _Point, add: Block) -> Block:
+    """Trace what the tension of a piece and the guides that stick, in order from the base on, add to an element.
+
+    `at` is the place of `u` of the pieces so far.
+    """
+    routes, k = plan.routes, len(form.moving)
+    block = Block(f"add_guide_{name}", "Add the piece of an actuator at a guide that rubs.", ("row", "at", "point"), add.trace)
+    directions = [block.load(place, "point") for place in (0, POINT_RECORD + 5, 2)]
+    tension, beyond, own = block.loads(POINT_RECORD + 1, 3, "point")
+    parts = zip((point.arms, point.around, point.radial), directions, strict=True)
+    slopes = sum((part[list(form.moving)] * direction for part, direction in parts), constants(np.zeros(k)))
+    before = vector(block.loads(0, k, "at"))
+    for place, slope in enumerate(slopes):
+        block.store(routes.load + place, block.load(routes.load + place) + tension * slope)
+        block.store(place, before[place] + beyond * slope, "at")
+    coupled = outer(before, slopes) + outer(slopes, before) + outer(slopes, slopes * own)
+    for place, index in enumerate(upper_triangle(k)):
+        block.store(routes.curvature + place, block.load(routes.curvature + place) + coupled[index])
+    return block
 
 
 def _second(form: Form, block: Block, point: _Point) -> Any:
@@ -186,7 +219,7 @@ def component_blocks(plan: Plan, name: str, form: Form) -> list[Block]:
     `other` is the place of the slopes, or of `C`, of length `n`, `pair` and `mirrored` those of `P_mn` and `P_nm`.
     """
     routes, k, sides = plan.routes, len(form.moving), range(len(plan.turns))
-    stride, count = routes.stride, routes.components
+    stride, count, held = routes.stride, routes.components, plan.unknowns.held_lengths
     name = f"_{plan.infix}{name}"
 
     def add(block: Block, place: int, values: Any, base: str = "") -> None:
@@ -213,7 +246,8 @@ def component_blocks(plan: Plan, name: str, form: Form) -> list[Block]:
     add(length, 0, vector(length.loads(0, k, "other")) * length.load(routes.square, "pair"), "to")
 
     hold = Block(f"hold_length{name}", "Begin the coupling of a given length.", ("at", "to"))
-    hold.store_all(0, [-one for one in hold.loads(0, k, "at")], "to")
+    begun: list[Scalar] = [*hold.loads(0, k, "to")] if routes.guided else [0.0] * k
+    hold.store_all(0, [old - one for old, one in zip(begun, hold.loads(0, k, "at"), strict=True)], "to")
 
     own = Block(f"meet_own{name}", "Add the coupling of an element with itself by a length.", ("at", "to"))
     product = outer(vector(own.loads(0, k, "at")), vector(own.loads(0, k, "to")))
@@ -258,4 +292,5 @@ def component_blocks(plan: Plan, name: str, form: Form) -> list[Block]:
         )
         step = vector(after.loads(place - layout.unknown, k, "q"))
         add(after, routes.turns + count * side, [vector(after.loads(0, k, "at")) @ step], "m")
-    return [clear, *([hold] if plan.unknowns.held_lengths else [turn, length, own]), hand, pair, begin, before, after]
+    meeting = [*([turn, length, own] if routes.guided or not held else []), *([hold] if routes.guided or held else [])]
+    return [clear, *meeting, hand, pair, begin, before, after]

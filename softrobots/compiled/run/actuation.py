@@ -38,6 +38,8 @@ class Actuation:
         strains = [bending for *bending, _ in chain.friction]
         self.rest_bending = chain.rest[np.array(strains, dtype=np.intp).reshape(-1, 2)]
         """Bending at rest of the sections with dry friction, shape (n_sections, 2) [rad]."""
+        self.n_guides = 0 if chain.guides is None else chain.guides.n_guides
+        """Number of guides that rub."""
         pairs = [(row, side, unknowns.place.get(one)) for row, pair in enumerate(strains) for side, one in enumerate(pair)]
         rubbing = [one for one in pairs if one[2] is not None]
         self._rubbing = np.array(rubbing, dtype=np.intp).reshape(-1, 3).T  # section, side, and place among the unknowns

@@ -41,17 +41,12 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
         Its solvers. numba compiles each of them on its first call.
 
     Raises:
-        ParameterError: If the model is not a SoftModel, actuators rub in their guides, the back end is unknown, or strains
-            cannot be locked.
+        ParameterError: If the model is not a SoftModel, the back end is unknown, or strains cannot be locked.
         NameNotFound: If a strain to lock does not exist.
         DescriptionError: If the robot is not a serial chain with linear springs.
         MissingDependency: If `backend` is "numba" and numba is not installed.
     """
-    if check_model(model).structure.guided:
-        requirement = (
-            "a robot without friction in guides, to be compiled; solve_equilibrium has it, guide_friction=0 leaves it out"
-        )
-        raise ParameterError("model", model.pinocchio.name, requirement)
+    check_model(model)
     chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
     if isinstance(locked_strains, str) or not isinstance(locked_strains, Iterable):
         raise ParameterError("locked_strains", locked_strains, f"a tuple of names, of {', '.join(STRAINS)}")
@@ -173,6 +168,7 @@ class CompiledModel(CompiledDynamics):
         tolerance: float = POSITION_TOLERANCE,
         threads: int = 1,
         starts: int = 1,
+        previous: Any = None,
     ) -> MotorBatch:
         """Find motors that put the loaded tip at targets, each case from its own start.
 
@@ -189,21 +185,23 @@ class CompiledModel(CompiledDynamics):
             threads: Number of threads; more than one speeds up numba only.
             starts: Number of searches of a target, until it is reached: the first from `q_motors0`, the others from motors
                 drawn within the limits, always the same ones.
+            previous: Where a robot with dry friction comes from, one equilibrium for all targets, see `equilibrium`; the same
+                step by `equilibrium` from there to the motors found tells what friction remembers after it.
 
         Returns:
             One row a target.
 
         Raises:
             ParameterError: If a shape differs, a pose has no rotation, gravity, tolerance or a count is out of range, or the
-                robot has no actuators, or dry friction; for poses also if it has less than six motors, sections, muscles or a
+                robot has no actuators; for poses also if it has less than six motors, sections, muscles or a
                 long chain.
         """
-        relaxed = start_motors(check_frictionless(self._model, "compiled inverse kinematics"), None)
+        relaxed, before = start_motors(self._model, None), self._before(previous, single=True)
         goals, poses = flat_targets(targets)
         run = self._run(gravity is not None, poses)
         positive_number("tolerance", tolerance, "m")
         begin = relaxed if q_motors0 is None else self._model.actuators.in_order(q_motors0, "q_motors0")
-        springs = self._model.rest if q_springs0 is None else q_springs0
+        springs = (self._model.rest if before is None else before.springs[0]) if q_springs0 is None else q_springs0
         points, loads, motors, unknowns = batch_rows(
             targets=(goals, run.layout.target_size),
             forces=(forces, 3),
@@ -214,7 +212,7 @@ class CompiledModel(CompiledDynamics):
         bad = unusable(points, loads, motors, unknowns) | self._actuation.unsuited(motors)
         points, loads, motors = without(points, bad), without(loads, bad), without(motors, bad, relaxed)
         unknowns = self._actuation.of_elastic(motors, without(unknowns, bad))
-        search, random = self._search(run), np.random.default_rng(_SEED)
+        search, random = self._search(run, before), np.random.default_rng(_SEED)
         found = search.reach_batch(points, loads, down, motors, unknowns, tolerance, threads)
         for _ in range(positive_integer("starts", starts, 10_000) - 1):
             left = np.flatnonzero((found[0] != Status.CERTIFIED) & ~bad)
@@ -238,6 +236,7 @@ class CompiledModel(CompiledDynamics):
         q_motors0: Any = None,
         gravity: Any = None,
         tolerance: float = POSITION_TOLERANCE,
+        previous: Any = None,
     ) -> MotorBatch:
         """Move the loaded tip through targets, each step from the last; one row a waypoint.
 
@@ -248,16 +247,18 @@ class CompiledModel(CompiledDynamics):
                 which takes some milliseconds.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             tolerance: Largest distance of the tip from a target [m].
+            previous: Where a robot with dry friction comes from, see `equilibrium`; each waypoint is a step from the last.
 
         Returns:
             Motors, elastic coordinates and errors of the waypoints; see the status of each.
 
         Raises:
-            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators, dry friction, or cannot
+            ParameterError: If a shape differs, a number is not finite, or the robot has no actuators, or cannot
                 have poses; see `inverse_kinematics`.
             TargetUnreachable: If the first waypoint cannot be reached; from `solve_ik` if no start is given.
         """
-        start_motors(check_frictionless(self._model, "compiled paths"), None)
+        start_motors(self._model, None)
+        before = self._before(previous, single=True)
         goals, poses = flat_targets(targets)
         run = self._run(gravity is not None, poses)
         (points,) = batch_rows(targets=(goals, run.layout.target_size))
@@ -273,7 +274,7 @@ class CompiledModel(CompiledDynamics):
             motors = solve_ik(self._model, points[0, :3], load, **options).q_motors
         else:
             motors = self._actuation.checked(q_motors0, "q_motors0")
-        batch, iterations = self._search(run).follow(points, load, gravity_vector(gravity), motors, tolerance)
+        batch, iterations = self._search(run, before).follow(points, load, gravity_vector(gravity), motors, tolerance)
         if batch.status[0] != Status.CERTIFIED:
             raise TargetUnreachable(
                 f"waypoint 1 of {len(points)} is not reached from motors {motors.tolist()}: the tip comes within "

@@ -135,6 +135,7 @@ class CompiledStatics(CompiledCode):
         before = self._before(previous, single=True)
         if before is not None:
             run.put(w, run.layout.sliders, before.sliders[0])
+            run.put(w, run.layout.anchors, before.anchors[0])
             springs = before.springs[0] if springs is None else springs
         if springs is None:
             status = Status(run.settle(w))
@@ -208,7 +209,8 @@ class CompiledStatics(CompiledCode):
         if before is not None:
             springs = np.broadcast_to(before.springs, (len(motors), self._model.n_springs))
             inputs += [(layout.sliders, before.sliders), (layout.unknown, self._actuation.of_elastic(motors, springs))]
-            results.append((layout.slid, layout.unknowns))
+            inputs.append((layout.anchors, before.anchors))
+            results += [(layout.slid, layout.unknowns), (layout.anchored, layout.guides)]
         (unknowns, tips, squares, *slid), statuses = solve_batch(run.settle_batch, inputs, results, len(motors), threads)
         residuals = root(squares)
         fail(statuses, bad, [residuals], [unknowns, tips, *slid])
@@ -216,4 +218,5 @@ class CompiledStatics(CompiledCode):
         if before is None:
             return EquilibriumBatch(springs, statuses, residuals, tips)
         statuses = np.where(before.lost, before.status, statuses).astype(np.uint8)
-        return EquilibriumBatch(springs, statuses, residuals, tips, friction_bending=self._actuation.bending(slid[0]))
+        remembered = {"friction_bending": self._actuation.bending(slid[0]), "friction_slip": slid[1]}
+        return EquilibriumBatch(springs, statuses, residuals, tips, **remembered)

@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.friction_states import StatesBefore
+from softrobots.compiled.run.friction_states import StatesBefore, gripping, remembered, state_after
 from softrobots.compiled.run.results import MotorBatch
 from softrobots.compiled.settings import HIDDEN, LEAST_SIZE, SEARCH_STEPS
 from softrobots.compiled.statuses import Status
@@ -48,7 +48,12 @@ class LoopedSearch:
         self.model, self.actuation, self.run = model, actuation, run
         self._start, self._given = model.rest, dict[str, Any]()
         if before is not None:
-            self._start, self._given = before.springs[0], {"sliders": before.sliders[0]}
+            self._start, self._given = before.springs[0], {"sliders": before.sliders[0], "anchors": before.anchors[0]}
+            self.model = remembered(actuation, before)
+
+    def after(self, w: Any) -> LoopedSearch:
+        """Return the searches from a state that was found; the same ones without dry friction."""
+        return LoopedSearch(self.model, self.actuation, self.run, state_after(self.actuation, self.run.layout, w))
 
     def settle(
         self, q_motors: FloatArray, force: FloatArray, gravity: FloatArray, start: FloatArray
@@ -110,7 +115,7 @@ class LoopedSearch:
         tolerance: float,
     ) -> tuple[Status, LocalSolution[ChainState]]:
         """Find actuators that put the tip within the tolerance [m] of a target, from given ones and elastic coordinates."""
-        tip = _SoughtTip(self.model, self, force, gravity, target)
+        tip = _SoughtTip(self, force, gravity, target)
         first = self.model.actuators.go(q_motors, np.zeros(len(q_motors)))  # within the limits
         first, start = tip.loaded.begin(first, start, tolerance)
         status, state = self.settle(first, force, gravity, start)
@@ -128,8 +133,8 @@ class LoopedSearch:
             One row a waypoint, with the last reached pose where no continuous motion leads further; and the number of steps to
             the first waypoint.
         """
-        status, here = self.reach(targets[0], force, gravity, q_motors, self.model.rest, tolerance)
-        tip, last, first = _SoughtTip(self.model, self, force, gravity, targets[0]), targets[0], here
+        status, here = self.reach(targets[0], force, gravity, q_motors, self._start, tolerance)
+        tip, last, first = _SoughtTip(self.after(here.state.w), force, gravity, targets[0]), targets[0], here
         poses, statuses = [here], [status]
         for target in targets[1:] if status == Status.CERTIFIED else ():
             there = advance(tip, Goal(last), Goal(target), here, tolerance)
@@ -140,6 +145,7 @@ class LoopedSearch:
             else:
                 here, last = there, target
                 poses.append(here)
+                tip = replace(tip, chain=tip.chain.after(here.state.w))
                 statuses.append(self._arrived(here, tolerance))
         batch = MotorBatch(
             np.array([one.state.q_springs for one in poses]),
@@ -236,11 +242,14 @@ class _MeasuredTorques:
 class _SoughtTip:
     """Problem of `tip_search`, see `tip_search.SoughtTip`."""
 
-    model: SoftModel
     chain: LoopedSearch
     force: FloatArray
     gravity: FloatArray
     target: FloatArray
+
+    @property
+    def model(self) -> SoftModel:
+        return self.chain.model
 
     @property
     def rows(self) -> int:
@@ -256,8 +265,9 @@ class _SoughtTip:
         if status != Status.CERTIFIED:
             return None
         excess = 0.0
-        if self.model.actuators.least_tension:
-            pulled = elastic_state(self.model, q_motors, state.q_springs, self.loaded.load)
+        if self.model.actuators.least_tension or self.model.structure.friction is not None:
+            rubbing = gripping(self.model, self.chain.run.layout, state.w)
+            pulled = elastic_state(rubbing, q_motors, state.q_springs, self.loaded.load)
             taut, excess = taken_up(self.model, q_motors, pulled)
             if not np.array_equal(taut, q_motors):
                 return self.solve(taut, state.q_springs)
@@ -272,9 +282,10 @@ class _SoughtTip:
     def missing(self, state: ChainState) -> FloatArray:
         return np.asarray(self.target - self.chain.tip(state.w))
 
-    def released(self, state: ChainState, held: TipModel, damping: float) -> list[TipModel]:
-        """Nothing: there are no obstacles."""
-        return []
+    def released(self, here: LocalSolution[ChainState], held: TipModel, damping: float) -> list[TipModel]:
+        """Return the model in which all slips, of a robot with dry friction; there are no obstacles."""
+        pulled = here.state.pulled
+        return [] if pulled is None else self.loaded.released(LocalSolution(here.q_motors, pulled, here.error), held, damping)
 
     def pull(self, state: ChainState, follow: FloatArray) -> Pull | None:
         """Return the tensions with their derivatives; None of muscles of given length that push."""

@@ -34,6 +34,9 @@ class NumpyBatches:
     def settle_batch(self, *batch: Any) -> None:
         """Find equilibria; see `lane_drivers`."""
         for w, statuses, given in self._blocks(*batch):
+            if self._module.N_GUIDES:
+                statuses[:] = [self._alone(w, lane, self._module.settle_from) for lane in range(len(statuses))]
+                continue
             for lane in self._run(w, statuses, "first_pass", "newton_pass"):
                 if self._module.N_SLIDERS:
                     statuses[lane] = self._again(w, lane, given, self._module.settle_from)

@@ -88,6 +88,11 @@ class CompiledEquilibrium(Summarised):
         return read_only(self._actuation.bending(self._part(self._layout.slid, self._layout.unknowns)[None])[0])
 
     @property
+    def friction_slip(self) -> FloatArray | None:
+        """Length of actuators beyond each guide at its slider, from rest, shape (n_guides,) [m]; None without dry friction."""
+        return self._part(self._layout.anchored, self._layout.guides) if self._layout.rubbing else None
+
+    @property
     def force(self) -> FloatArray:
         """Force on the tip, shape (3,) [N], world axes, read-only."""
         return self._part(self._layout.force, 3)
@@ -189,6 +194,8 @@ class EquilibriumBatch(Batch):
     """The loaded tip, shape (n, 3) [m], world axes."""
     friction_bending: FloatArray | None = field(default=None, kw_only=True)
     """Bending that dry friction remembers, of the sliders of its sections, shape (n, n_sections, 2) [rad]; None without it."""
+    friction_slip: FloatArray | None = field(default=None, kw_only=True)
+    """Length of actuators beyond each guide at its slider, from rest, shape (n, n_guides) [m]; None without dry friction."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)

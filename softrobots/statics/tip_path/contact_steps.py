@@ -90,11 +90,12 @@ class RubbingTip:
             raise NeutralEquilibrium("the equations of the step are singular")
         return held.slope, held.follow
 
-    def released(self, state: Rest, held: TipModel, damping: float) -> list[TipModel]:
+    def released(self, here: LocalSolution[Rest], held: TipModel, damping: float) -> list[TipModel]:
         """Return the models in which contacts begin to slip towards the goal, or slip back, or open; each alone, or all.
 
         A contact slips the way that it would take without friction.
         """
+        state = here.state
         found, by_motors, mu = state.found, state.robot.by_motors(state.found), self.last.friction
         laws, near = found.laws, found.contacts
         pressed = np.flatnonzero(laws.pressed)
@@ -190,7 +191,7 @@ class TargetWay:
         """What the motors turn to the goal by the first linear model that leads there, and how far the springs then move."""
         basis = self._model.actuators.basis
         with contextlib.suppress(NeutralEquilibrium):
-            for model in tip_models(tip, here.state):
+            for model in tip_models(tip, here):
                 left, sizes, right = np.linalg.svd(model.slope @ basis * self._model.motor_scale.max(), full_matrices=False)
                 moves = sizes > _NO_MOTION * self._model.reach
                 turn = right[moves].T @ ((left[:, moves].T @ model.missing) / sizes[moves])
