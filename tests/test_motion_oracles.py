@@ -175,7 +175,7 @@ def test_flexures_carry_no_actuators() -> None:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("rod", "form", "force", "bends", "steps"),
-    [(TPU, "lumped", 0.1, 11, 1100), (TPU, "flexures", 0.3, 12, 1300), (STEEL, "flexures", 0.6, 12, 2400)],
+    [(TPU, "lumped", 0.1, 10, 500), (TPU, "flexures", 0.3, 11, 600), (STEEL, "flexures", 0.6, 12, 1300)],
     ids=["pairs", "flexures", "steel"],
 )
 def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
@@ -183,10 +183,10 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
 ) -> None:
     """30 pairs of hinges or flexures, undamped, released upright from a sideways force, with steps by default.
 
-    The reference, by its polynomials and its steps in 0.05 s, is five times as good.
+    The reference is five times as good, by one with a polynomial and a fifth of the steps in 0.05 s less.
     """
     fine = _path(dataclasses.replace(rod, bends=bends), force, 10.0, 200, steps)
-    coarse = _path(dataclasses.replace(rod, bends=bends - 1), force, 10.0, 200, steps)
+    coarse = _path(dataclasses.replace(rod, bends=bends - 1), force, 10.0, 200, 4 * steps // 5)
     assert np.linalg.norm(fine - coarse, axis=1).mean() < 1e-4
     model = chain(rod, 30, form, extension=rod.stretches > 0)
     start = sr.solve_equilibrium(model, (), force=(force, 0.0, 0.0), gravity=(0.0, 0.0, -9.81))
