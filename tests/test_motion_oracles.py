@@ -199,8 +199,8 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
 @pytest.mark.parametrize(
     "engine",
     [
-        pytest.param("general", marks=pytest.mark.shortened(10, 50)),
-        pytest.param("compiled", marks=pytest.mark.shortened(200, 1600)),
+        pytest.param("general", marks=pytest.mark.shortened(5, 50)),
+        pytest.param("compiled", marks=pytest.mark.shortened(60, 1600)),
     ],
 )
 def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
@@ -231,7 +231,7 @@ def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(6, 200)
+@pytest.mark.shortened(3, 200)
 def test_random_pulses_and_moving_motors_keep_their_energy(cases: int) -> None:
     """Loads that jump at round times, motors that move, steps that are chosen, both engines: the tip agrees, energy is kept."""
     rng, model = np.random.default_rng(8), sr.load_model(sr.InflatableArm())
