@@ -516,15 +516,6 @@ def test_docs_are_made_of_whole_results_only(settings: dict, row: dict, told: st
 # --- The script
 
 
-def test_the_script_explains_itself(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        load_script("benchmark").main(["--help"])
-    assert ended.value.code == 0
-    told = capsys.readouterr().out
-    assert all(f"--{name}" in told for name in ("only", "rounds", "quick", "from", "json", "plots", "docs"))
-    assert all(job in told for job in JOBS)
-
-
 def test_the_script_runs_end_to_end(tool: Callable, stand_in: list, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     tool("mujoco")
     target = tmp_path / "results.json"

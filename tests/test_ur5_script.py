@@ -78,13 +78,6 @@ def test_a_line_is_followed_with_the_loaded_tip(tmp_path: Path, capsys: pytest.C
     assert "WARNING: a link wrinkles" in capsys.readouterr().out
 
 
-def test_it_explains_itself(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script(NAME, ["--help"])
-    assert ended.value.code == 0
-    assert "--keep-orientation" in capsys.readouterr().out
-
-
 @pytest.mark.parametrize("robot", ["helix_tube", "pcc_arm"])
 def test_other_arms_are_carried_and_orientation_comes_back(robot: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     arguments = ["--robot", robot, "--keep-orientation", "--payload", "0.001", "--gravity", "0", "0", "-1", "--no-plots"]
