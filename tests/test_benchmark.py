@@ -368,6 +368,7 @@ def test_equilibria_in_contact_are_compared_with_mujoco(tool: Callable, monkeypa
     """Its forces are compared with ours on its robot before anything is timed; settings that are too soft are passed over."""
     tool("mujoco")
     scene = contact_jobs.leaning_arm(2)
+    monkeypatch.setattr(contact_jobs, "compiled", lambda model, backend: compiled_solvers.compiled(model, "python"))
     monkeypatch.setattr(contact_jobs, "TIME_STEPS", (0.002, 0.01))
     monkeypatch.setattr(contact_jobs, "LARGE_STEPS", ())
     monkeypatch.setattr(contact_jobs, "leaning_arm", lambda count, on="wall": scene._replace(dampings=(16.0,)))
