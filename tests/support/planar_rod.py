@@ -166,7 +166,7 @@ class PlanarRod(RoundRod):
     def frequencies(self) -> np.ndarray:
         """Of small vibrations of the straight weightless rod [rad/s]."""
         rest = np.zeros(self.bends + self.stretches)
-        return np.sqrt(eigh(self._grid[-1], self._at(rest, rest, np.zeros(2))[0], eigvals_only=True))
+        return np.asarray(np.sqrt(eigh(self._grid[-1], self._at(rest, rest, np.zeros(2))[0], eigvals_only=True)))
 
     def equilibrium(self, force: tuple[float, float]) -> np.ndarray:
         """Coordinates at rest under a force on the tip along x and z [N]: SciPy's root from the straight rod, in steps."""
@@ -179,4 +179,5 @@ class PlanarRod(RoundRod):
     def tips(self, start: np.ndarray, duration: float, rows: int, per_row: int) -> np.ndarray:
         """Path of the tip from rest at coordinates `start`, shape (rows + 1, 2) [m], with `per_row` steps between two rows."""
         arguments = np.zeros(2), self._grid, self._constants, duration / (rows * per_row), rows * per_row, per_row
-        return _runge_kutta(start, *arguments)
+        path: np.ndarray = _runge_kutta(start, *arguments)
+        return path
