@@ -78,7 +78,7 @@ def test_the_oracle_sees_a_branch_that_is_left_out() -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(6, 25)
+@pytest.mark.shortened(2, 25)
 @pytest.mark.parametrize("seed", range(8))
 def test_no_branch_of_200_random_arms_is_missed(seed: int, cases: int) -> None:
     """In every other arm each link has a plateau."""

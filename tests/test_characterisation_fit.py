@@ -265,14 +265,14 @@ def test_points_beside_the_knee_do_not_narrow_the_interval() -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(1000, 4000)
+@pytest.mark.shortened(250, 4000)
 @pytest.mark.parametrize(("noise", "proportional"), [(0.03, True), (0.05, True), (0.08, True), (0.2, False), (0.6, False)])
 @each_row("free", [True, False])
 @each_row("n", [6, 15, 40, 100])
 def test_intervals_cover_95_of_100_and_plateaus_are_true(
     free: bool, n: int, noise: float, proportional: bool, cases: int
 ) -> None:
-    """93 to 97 % of few points, 94 to 96 % of 40, to three standard errors, 0.34 % each of 4000; false plateaus in at most 1 %.
+    """93 to 97 % of few points, 94 to 96 % of 40, to three standard errors, 0.34 % each of 4000; false plateaus in 1 % and two.
 
     The plateaus of Table 3 are found: always, but for noise of 8 % with few points.
     """
@@ -280,7 +280,7 @@ def test_intervals_cover_95_of_100_and_plateaus_are_true(
     most_off = (0.01 if n >= 40 else 0.02) + 3.0 * np.sqrt(0.95 * 0.05 / cases)
     linear = repeated(cases, n, np.inf, noise, proportional, **options)
     assert linear.covered == pytest.approx(0.95, abs=most_off)
-    assert linear.plateaus <= 0.01
+    assert linear.plateaus <= 0.01 + 2.0 / cases
     for most in (15.0, 18.0, 21.76) if n >= 40 else ():
         saturated = repeated(cases, n, most, noise, proportional, **options)
         assert saturated.covered == pytest.approx(0.95, abs=most_off)

@@ -78,28 +78,6 @@ def test_loops_in_a_batch_play_between_two_lines(fast: CompiledModel) -> None:
             assert sections[robot] == pytest.approx(np.full(4, expected), abs=PLAY)
 
 
-def test_the_moment_of_friction_acts_against_the_bending_whatever_its_direction() -> None:
-    """A force across a straight segment in twelve directions: each section bends by the moment at its middle, less friction."""
-    fast = compiled(
-        sr.TendonArm(
-            segment_lengths=(LENGTH,), tendon_azimuths=(), bending_stiffness=EI, elastic_sections=4, bending_friction=1e-3
-        )
-    )
-    angles = np.arange(12) * np.pi / 6.0
-    across = np.stack([np.cos(angles), np.sin(angles), 0.0 * angles], axis=1)
-    springs = fast.equilibria(np.zeros((12, 0)), 0.05 * across).q_springs.reshape(12, 4, 4)
-    rates = springs[:, :, :2] / (LENGTH / 4)
-    towards, aside = (
-        np.einsum("ijk,ik->ij", rates, np.stack(way, axis=1)) for way in (across.T[[1, 0]] * [[-1.0], [1.0]], across.T[:2])
-    )
-    moments = 0.05 * (LENGTH - LENGTH * (np.arange(4) + 0.5) / 4)
-    expected = np.maximum(moments - 1e-3, 0.0) / EI
-    # A stick is 6.7e-3 rad/m of a section; the bow, 0.03 rad, shortens levers by less than 1e-3 of them.
-    assert towards == pytest.approx(np.tile(expected, (12, 1)), abs=8e-3)
-    assert np.ptp(towards, axis=0).max() < 1e-9
-    assert np.abs(aside).max() < 1e-9
-
-
 @pytest.mark.parametrize("locked", [(), pytest.param(("bend_x", "twist", "stretch"), marks=pytest.mark.study)], ids=str)
 def test_a_tendon_in_its_guides_follows_the_capstan(locked: tuple[str, ...]) -> None:
     r"""`EI theta' = T d exp(-mu theta)`, so :math:`\theta = \log(1 + \mu T d s / EI) / \mu`; let go, with the other sign."""

@@ -12,7 +12,7 @@ import pytest
 import softrobots as sr
 from softrobots.compiled import Status
 from softrobots.compiled.run.compiled_model import CompiledModel
-from tests.support.rods import Rod, elastica_tip, rod_tip
+from tests.support.rods import Rod, rod_tip
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
 EI, LENGTH = 1.5, 1.0
@@ -152,23 +152,6 @@ def rod(count: int, chain: str, locked: tuple[str, ...] = (), stiff: float = 1.0
         **({"elastic_sections": count} if chain == "sections" else {"hinges": count, "torsion": False, "extension": False}),
     )
     return sr.compile(sr.load_model(arm, muscles="forces"), backend="python", locked_strains=locked)
-
-
-@pytest.mark.study
-@pytest.mark.parametrize(("chain", "counts"), [("sections", (13, 52)), ("lumped", (16, 32))])
-def test_convergence_to_the_elastica(chain: str, counts: tuple[int, ...]) -> None:
-    """52 sections are 312 joints. An inextensible rod in closed form; the error is of second order."""
-    locked = ("twist", "stretch") if chain == "sections" else ()
-    errors = []
-    for count in counts:
-        solver = rod(count, chain, locked)
-        found = solver.equilibrium(solver.model.relaxed_motors, (3.0, 0.0, 0.0))
-        x, z, _ = elastica_tip(EI, LENGTH, 3.0)
-        errors.append(np.linalg.norm(found.tip_position - (x, 0.0, z)))
-        assert found.residual <= 1e-10 * 3.0
-    steps = np.diff(np.log(errors)) / np.diff(np.log(counts))
-    assert np.all(np.abs(steps + 2.0) < 0.15)
-    assert errors[-1] < (2e-4 if chain == "sections" else 2e-3)
 
 
 def test_convergence_to_a_rod_in_space() -> None:

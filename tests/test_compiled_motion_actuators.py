@@ -18,7 +18,6 @@ from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.gauss import SQUARES, STAGES, WEIGHTS
-from softrobots.dynamics.motion import MotionState
 from tests.support.c_libraries import Controller
 from tests.support.serial_chains import ARM, LENGTHS, ROBOTS
 
@@ -148,52 +147,6 @@ def test_a_step_solves_the_equations_of_motion(name: str, order: int, rng: np.ra
         assert np.abs(error).max() < 1e-12 * size
 
 
-def excited(name: str, rng: np.random.Generator) -> tuple[sr.SoftModel, np.ndarray, np.ndarray]:
-    """A robot, inputs that pull all tendons, and velocities that displace the tip by a centimetre in some milliseconds."""
-    model = robot(name)
-    tight = {"elastic": -2e-3, "tension": 4.0, "pressure": 4e4, "mckibben": 4e4, "length": 0.0}
-    motors = model.relaxed_motors + np.array([tight[tag.kind] for tag in model.muscles])
-    return model, motors, np.where(model.springs.turning, 3.0, 0.01) * rng.normal(size=model.n_springs)
-
-
-@pytest.mark.parametrize(("name", "order"), [("tendons", 4), ("winding", 2), ("winding lengths", 2), ("lengths", 4)])
-def test_undamped_motion_runs_backwards(name: str, order: int, rng: np.random.Generator) -> None:
-    """Both methods are symmetric in time: with reversed velocities a robot goes back to where it came from."""
-    model, motors, start_rates = excited(name, rng)
-    springs, rates = model.rest, start_rates
-    for sign in (1.0, -1.0):
-        rates = sign * rates
-        for _ in range(4):
-            springs, rates, _ = solver(name).step(springs, rates, motors, time_step=1e-4, damping_time=0.0, order=order)
-        if sign > 0.0:
-            assert np.abs(springs - model.rest).max() > 5e-4
-    np.testing.assert_allclose(springs, model.rest, rtol=0, atol=1e-10)
-    assert np.abs(rates + start_rates).max() < 1e-6 * np.abs(start_rates).max()
-
-
-@pytest.mark.parametrize(("name", "step"), [("tendons", 1e-4), ("winding lengths", 8e-4)])
-def test_energy_is_kept(name: str, step: float, rng: np.random.Generator) -> None:
-    """Motors of tendons and lengths stand still and do no work: the energy, by Pinocchio, keeps to the order of the steps."""
-    model, motors, rates = excited(name, rng)
-    start = MotionState(model, 0.0, motors, np.zeros(model.n_motors), model.rest, 0.1 * rates)
-    errors = []
-    for h in (step, 0.5 * step):
-        energy = solver(name).simulate(10.0 * step, motors, start=start, damping_time=0.0, time_step=h).energy
-        errors.append(np.abs(energy.balance).max())
-        assert energy.kinetic.max() > 20.0 * errors[-1]
-    assert errors[1] < 0.3 * errors[0]
-
-
-def test_it_comes_to_rest_in_the_equilibrium() -> None:
-    """Overdamped, with slack tendons: the equilibrium of the general engine."""
-    model = robot("tendons")
-    motors = model.relaxed_motors + np.resize((-0.003, 0.004, 0.004), model.n_motors)
-    rest = sr.solve_equilibrium(model, motors, gravity=GRAVITY)
-    motion = solver("tendons").simulate(1.0, motors, gravity=GRAVITY, damping_time=0.05, time_step=5e-3)
-    assert (rest.muscle_forces == 0.0).any()
-    np.testing.assert_allclose(motion.tip_position[-1], rest.tip_position, rtol=0, atol=1e-6)  # e^-20 of some centimetres
-
-
 def test_locked_strains_of_given_lengths_stay_at_rest(rng: np.random.Generator) -> None:
     """Without twist: the motion is that of an arm ten million times as stiff in twist, and lengths are linear."""
     arm = {"segment_lengths": (0.5, 0.4), "elastic_sections": 2}
@@ -214,7 +167,7 @@ def test_a_step_beyond_the_range_of_a_route_fails() -> None:
 
 
 @pytest.mark.system
-@pytest.mark.parametrize(("name", "order"), [("tendons", 2), ("tendons", 4), ("winding lengths", 2), ("lumped winding", 4)])
+@pytest.mark.parametrize(("name", "order"), [("tendons", 4), ("winding lengths", 2)])
 def test_the_c_file_takes_the_same_steps(name: str, order: int, tmp_path: Path, rng: np.random.Generator) -> None:
     """Through ctypes."""
     model, motors, h = robot(name), inputs(robot(name), rng), 1e-3
@@ -233,14 +186,11 @@ def test_the_c_file_takes_the_same_steps(name: str, order: int, tmp_path: Path, 
 
 
 @pytest.mark.system
-@pytest.mark.parametrize(
-    ("arm", "order"), [(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1), 2), (sr.PccArm(elastic_sections=1), 4)]
-)
-def test_numba_takes_the_same_steps(arm: Any, order: int, rng: np.random.Generator) -> None:
+def test_numba_takes_the_same_steps(rng: np.random.Generator) -> None:
     """In lanes; a lane that fails there would be done alone."""
-    model = sr.load_model(arm)
+    model = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1))
     motors = np.array([inputs(model, rng) for _ in range(2)])
-    given = {"gravity": GRAVITY, "damping_time": 0.01, "time_step": 1e-3, "output_step": 1e-3, "order": order}
+    given = {"gravity": GRAVITY, "damping_time": 0.01, "time_step": 1e-3, "output_step": 1e-3}
     expected = sr.compile(model, backend="python").simulate(0.01, motors[1], **given)
     found = sr.compile(model, backend="numba").simulations(0.01, motors, **given)
     np.testing.assert_allclose(found.tip_position[1], expected.tip_position, rtol=0, atol=1e-11)

@@ -143,7 +143,7 @@ def test_a_ball_is_driven_against_an_arm_that_snaps_past_it_in_any_number_of_row
     """Above the arm by 0.4575 m it touches when it has gone that far less both radii; where it snaps is the same, too."""
     ball = sr.Environment([sr.Sphere(radius, (0.8, 0, 0.4575), pose=lambda s: moved(z=-s))])
     snaps = []
-    for rows in (2, 3, 4, 5, 7):
+    for rows in (2, 4, 7):
         path = sr.follow_contact(arm, (0, 0, 0), environment=ball, parameters=np.linspace(0, 1.2, rows))
         made, lost = path.events
         assert (made.kind, lost.kind) == ("made", "lost")

@@ -67,10 +67,3 @@ def test_bad_words_are_refused(words: list[str], told: str, tmp_path: Path, caps
     assert run_script("contact", [*words, "--output", str(tmp_path / "out")]) == 2
     assert told in capsys.readouterr().err
     assert not (tmp_path / "out").exists()
-
-
-def test_it_explains_itself(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script("contact", ["--help"])
-    assert ended.value.code == 0
-    assert "usage:" in capsys.readouterr().out

@@ -136,9 +136,9 @@ def test_what_friction_cannot_have_is_refused(arm: sr.SoftModel) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("friction", [0.7, 1.0])
-def test_a_tip_that_jams_on_a_wall_is_let_press_less(start: sr.Equilibrium, friction: float) -> None:
+def test_a_tip_that_jams_on_a_wall_is_let_press_less(start: sr.Equilibrium) -> None:
     """Any place of the wall has a solution, with less force if not with more; it is one of the free robot under that force."""
+    friction = 1.0
     path = along_the_wall(start, np.linspace(0.0, 0.02, 5), friction)
     assert path.tip_error.max() < 1e-9
     for found in path.equilibria[1:]:

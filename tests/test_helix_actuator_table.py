@@ -57,14 +57,6 @@ def test_a_cubic_table_is_scipys_and_its_inverse_is_the_root(shares: tuple[float
         assert table.pressure_for(wanted) == pytest.approx(root, abs=1e-8)  # twice the tolerance of brentq, and rounding
 
 
-@pytest.mark.parametrize(("shares", "kind"), KINDS)
-def test_the_slope_is_the_derivative(shares: tuple[float, ...], kind: str) -> None:
-    table = ActuatorTable(PRESSURES, shares, kind)
-    places = np.array([1e3, 9e3, 18e3, 33e3, 59e3])  # no row within the step
-    difference = (table.contraction_at(places + 1.0) - table.contraction_at(places - 1.0)) / 2.0
-    np.testing.assert_allclose(table.slope_at(places), difference, rtol=1e-7)  # truncation (1 Pa / 1e4 Pa)^2, rounding 1e-11
-
-
 @law("helix.ActuatorTable")
 @settings(max_examples=60, deadline=None)
 @given(
@@ -120,17 +112,6 @@ def test_a_table_is_frozen() -> None:
 
 
 # --- Files
-
-
-@pytest.mark.parametrize(("shares", "kind"), KINDS)
-def test_what_is_written_is_read_back_digit_by_digit(shares: tuple[float, ...], kind: str, tmp_path: Path) -> None:
-    table = ActuatorTable(np.array(PRESSURES) / 3.0, np.array(shares) / 1.1, kind)
-    path = table.write_csv(tmp_path / "new" / "muscle.csv")
-    again = ActuatorTable.read_csv(path, kind)
-    assert again.pressure.tolist() == table.pressure.tolist()
-    assert again.contraction.tolist() == table.contraction.tolist()
-    assert again.interpolation == kind
-    assert path.read_text().splitlines()[0] == "pressure_Pa,contraction"
 
 
 def test_a_file_is_not_overwritten_unless_told(tmp_path: Path) -> None:

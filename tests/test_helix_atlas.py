@@ -191,15 +191,6 @@ def test_bad_input_is_refused_and_leaves_nothing(
     assert not folder.exists()
 
 
-@pytest.mark.parametrize(("arguments", "status"), [(["--help"], 0), (["--angles"], 2), (["--length", "long"], 2), (["-x"], 2)])
-def test_the_command_line_explains_itself(arguments: list[str], status: int, capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script("helix_atlas", arguments)
-    assert ended.value.code == status
-    told = capsys.readouterr()
-    assert "usage:" in told.out + told.err
-
-
 # --- What the pictures show, read back from the figures
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import cmath
-import csv
 import math
 import pickle
 import re
@@ -199,16 +198,6 @@ def test_both_conditions_meet_at_one_angle() -> None:
     found = helix.self_contact(helix.forward(float(helix.contraction_limit(crossing)), crossing, 1.0))
     assert float(found.turn_clearance) == pytest.approx(0.0, abs=1e-9)
     assert float(found.fold_margin) == pytest.approx(0.0, abs=1e-9)
-
-
-def test_contact_ends_at_the_limit_once_and_for_all() -> None:
-    angles = np.concatenate([np.radians(np.linspace(0.02, 89.9, 300)), [1e-12, 1e-8, 1e-5]])[:, None]
-    limits = helix.contraction_limit(angles)
-    shares = np.linspace(0.01, 1.0, 400)
-    found = helix.self_contact(helix.forward(shares, angles, DIAMETER))
-    near = np.abs(shares - limits) < 1e-9
-    assert not near.any()  # so that rounding decides nothing
-    assert np.array_equal(found.touches, shares < limits)
 
 
 @pytest.mark.parametrize("angle", [1e-12, 1e-6, 0.01, 0.2, 0.6, 0.88, 0.885, 1.0, 1.3, 1.5])
@@ -542,23 +531,6 @@ def test_a_table_says_what_cannot_be_built() -> None:
     assert [row.realisable for row in table.rows] == [False, False, True]
     assert [row.realisable_by_simple_rule for row in table.rows] == [False, True, True]  # between the two limits
     assert helix.shape_table([], 0.1, DIAMETER).rows == ()
-
-
-def test_csv_holds_every_number_to_the_last_digit(tmp_path: Path) -> None:
-    table = helix.shape_table([0.3, 0.9], np.radians([[0.0], [5.0]]), DIAMETER)
-    target = table.write_csv(tmp_path / "deep" / "grid.csv")
-    with target.open(newline="", encoding="utf-8") as file:
-        lines = list(csv.reader(file))
-    assert lines[0][:3] == ["angle [rad]", "contraction [-]", "diameter [m]"]
-    assert len(lines) == 5
-    for line, row in zip(lines[1:], table.as_rows(), strict=True):
-        assert [float(cell) for cell in line[:6]] == list(row.values())[:6]
-        assert (float(line[6]) if line[6] else None) == row["turn_distance"]
-        assert [{"true": True, "false": False}[cell] for cell in line[7:]] == [
-            row["realisable"],
-            row["realisable_by_simple_rule"],
-        ]
-    assert [line[6] == "" for line in lines[1:]] == [False, False, False, True]
 
 
 def test_nothing_is_overwritten_unasked(tmp_path: Path) -> None:

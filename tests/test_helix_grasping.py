@@ -223,13 +223,6 @@ def test_force_rises_strictly_until_the_tube_would_rather_unwrap() -> None:
     assert grasp.deflection[rising][-1] == pytest.approx(0.00198, abs=1e-5)  # so 2 and 4 mm give one force
 
 
-def test_forces_scale_with_the_square_of_the_size() -> None:
-    double = {name: value if name == "turns" else 2.0 * value for name, value in PAPER.items()}
-    one, two = grasp_force(1e4, deflection=0.001, **PAPER), grasp_force(1e4, deflection=0.002, **double)
-    np.testing.assert_allclose([two.unwrapping, two.contact], [4.0 * one.unwrapping, 4.0 * one.contact], rtol=1e-13)
-    assert two.volume == pytest.approx(8.0 * float(one.volume), rel=1e-13)
-
-
 def test_arguments_broadcast() -> None:
     table = grasp_force(np.linspace(0.0, 2e4, 5)[:, None], deflection=PAPER_CYLINDER.deflections, **PAPER)
     assert table.force.shape == table.volume.shape == table.pressure.shape == (5, 3)

@@ -122,26 +122,6 @@ def test_frenet_quantities_are_derivatives_of_the_points(actuator: tuple[float, 
 @every_actuator
 @every_path
 @every_hand
-def test_frames_obey_frenet_serret(actuator: tuple[float, ...], path: str, handedness: str) -> None:
-    """`T' = kappa N`, `N' = -kappa T + tau B`, `B' = -tau N` along the length: this tells torsion of straight paths too."""
-    shape = helix.forward(*actuator)
-    kappa, tau = helix.curvature_torsion(shape, path, handedness)
-    size = math.hypot(float(shape.radius(path)), float(shape.pitch))
-
-    def vectors(s: np.ndarray) -> np.ndarray:
-        curves = (helix.tangents, helix.normals, helix.binormals)
-        return np.stack([curve(shape, s, path, handedness) for curve in curves], axis=1)
-
-    for s in (0.3, -4.0):
-        tangent, normal, binormal = vectors(np.array([s]))[0]
-        slope = rates(vectors, s)[0] / size
-        expected = [kappa * normal, tau * binormal - kappa * tangent, -tau * normal]
-        assert np.allclose(slope, expected, rtol=0.0, atol=1e-11 / size)  # unit vectors, rounding over the step
-
-
-@every_actuator
-@every_path
-@every_hand
 def test_frames_are_proper_and_made_of_the_vectors(actuator: tuple[float, ...], path: str, handedness: str) -> None:
     shape, s = helix.forward(*actuator), np.linspace(-20.0, 20.0, 41)
     poses = helix.frames(shape, s, path, handedness)
@@ -153,22 +133,6 @@ def test_frames_are_proper_and_made_of_the_vectors(actuator: tuple[float, ...], 
     assert np.array_equal(poses[:, :3, 3], helix.points(shape, s, path, handedness))
     for column, vectors in enumerate((helix.normals, helix.binormals, helix.tangents)):
         assert np.array_equal(rotations[:, :, column], vectors(shape, s, path, handedness))
-
-
-@every_actuator
-@every_path
-@every_hand
-def test_equal_steps_are_one_constant_screw(actuator: tuple[float, ...], path: str, handedness: str) -> None:
-    """The law of the equivalent chain: strains (0, kappa, sigma tau), whatever the place and the length of the step."""
-    shape = helix.forward(*actuator)
-    kappa, tau = map(float, helix.actuator_curvature_torsion(*actuator, path, handedness))
-    for length, start in itertools.product((0.01, 0.3), (0.0, 0.11, 1.7)):
-        ends = helix.turn_angle(shape, [start, start + length], path)
-        first, last = helix.frames(shape, ends, path, handedness)
-        motion = screw(kappa, tau, length)
-        # Points lie at up to 10 m from the axis of the widest helix; scipy squares a matrix of norm up to 60.
-        scale = 1.0 + float(shape.outer_radius) + length * max(abs(kappa), abs(tau))
-        assert np.allclose(np.linalg.solve(first, last), motion, rtol=0.0, atol=2e-14 * scale)
 
 
 @every_hand
@@ -306,18 +270,6 @@ def test_reference_curvature_and_torsion_of_theory() -> None:
     straight = helix.actuator_curvature_torsion(1.0, 0.3, D)
     assert float(straight[0]) == 0.0
     assert float(straight[1]) == pytest.approx(2.0 * math.tan(0.3) / D, rel=1e-15)
-
-
-@every_path
-@every_hand
-def test_left_is_the_mirror_image_of_right(path: str, handedness: str) -> None:
-    for actuator in ACTUATORS:
-        shape = helix.forward(*actuator)
-        kappa, tau = helix.curvature_torsion(shape, path, handedness)
-        right = helix.curvature_torsion(shape, path)
-        assert kappa == right[0]
-        assert tau == HANDS[handedness] * right[1]
-        assert helix.material_twist(*actuator, handedness) == HANDS[handedness] * helix.material_twist(*actuator)
 
 
 # --- Lengths, turns and volume
@@ -486,19 +438,6 @@ def test_tension_is_the_pressure_times_the_derivative_of_the_volume(contraction:
         # lambda + cos(2 theta) = 2 cos(theta)^2 - (1 - lambda) may cancel; differences are good to 1e-50.
         terms = (2 * mp.cos(half) ** 2 + (1 - share)) / (2 * abs(1 + share * mp.expj(2 * half)))
         assert_close(tension, exact, (TOLERANCE * terms + mp.mpf(10) ** -50) * pressure * mp.pi * size**2 / 4)
-
-
-@every_actuator
-def test_tension_is_the_derivative_of_our_volume(actuator: tuple[float, ...]) -> None:
-    contraction, angle, diameter = actuator
-    if contraction > 0.9999:
-        return  # a difference would leave the domain
-    step = 1e-5 * contraction
-    volumes = helix.volume([contraction - step, contraction + step], angle, diameter, 2.0)
-    lengths = 2.0 * np.array([contraction - step, contraction + step]) / math.cos(angle)
-    slope = np.diff(volumes)[0] / np.diff(lengths)[0]
-    cap = np.pi * diameter**2 / 4
-    assert float(helix.actuator_tension(*actuator, 5e3)) == pytest.approx(5e3 * slope, abs=5e3 * cap * 1e-9)  # 1e-16 / 1e-5
 
 
 def test_tension_gives_the_collapse_moment_of_theory() -> None:

@@ -355,14 +355,6 @@ def test_reference_of_theory() -> None:
     assert float(shape.diameter) == pytest.approx(D, rel=4e-16)
 
 
-@pytest.mark.parametrize("scale", [2.5, 1e-6, 1e6])
-def test_shapes_scale_with_the_diameter(scale: float) -> None:
-    """The paper's check: 2.5 times the diameter, 2.5 times the helix."""
-    shape, scaled = helix.forward(0.66, 5 * DEG, D), helix.forward(0.66, 5 * DEG, scale * D)
-    for one, other in zip(arrays(shape), arrays(scaled), strict=True):
-        assert float(other) == pytest.approx(scale * float(one), rel=1e-15)  # three roundings
-
-
 # --- Arrays and the shape object
 
 

@@ -32,7 +32,6 @@ from tests.support.mujoco_balance import assert_mujoco_balances
 
 FIELDS: dict[str, Any] = {"length": 0.5, "bending_stiffness": 0.02, "torsional_stiffness": 0.012, "axial_stiffness": 100.0}
 """0.9 turns of the paper's helix, soft: a force of 1 N moves the tip by some 0.3 m."""
-MIRROR = np.diag([1.0, -1.0, 1.0])
 
 
 def tube(count: int, **fields: Any) -> HelixTube:
@@ -327,22 +326,6 @@ def test_a_straight_tube_is_an_ordinary_cantilever() -> None:
 
 
 # --- Symmetry
-
-
-@pytest.mark.study
-@pytest.mark.parametrize("chain", CHAINS)
-def test_the_mirrored_load_moves_the_tube_of_the_other_hand_to_the_mirrored_place(chain: str) -> None:
-    """Forces and positions change sign along y, moments and rotations (axial vectors) along x and z; to the solver's 1e-13."""
-    axial = -MIRROR
-    tip, gravity = np.array([0.3, -0.4, 0.2, 0.01, 0.015, -0.02]), np.array(GRAVITY)
-    right, left = (model(6, handedness=handedness, **CHAINS[chain]) for handedness in ("right", "left"))
-    one = sr.solve_equilibrium(right, (), wrench=tip, gravity=gravity, tolerance=1e-13)
-    mirrored = np.r_[MIRROR @ tip[:3], axial @ tip[3:]]
-    other = sr.solve_equilibrium(left, (), wrench=mirrored, gravity=MIRROR @ gravity, tolerance=1e-13)
-    assert np.linalg.norm(one.tip_position - frame_placement(right, right.configuration([]), "tip").translation) > 0.1
-    assert np.allclose(other.tip_position, MIRROR @ one.tip_position, atol=1e-10)
-    assert np.allclose(other.transform_tip_to_world.rotation, MIRROR @ one.transform_tip_to_world.rotation @ MIRROR, atol=1e-10)
-    assert np.allclose(other.link_moments, one.link_moments, atol=1e-11)
 
 
 @pytest.mark.parametrize("chain", ["sections", "corrected"])

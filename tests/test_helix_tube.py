@@ -10,7 +10,6 @@ import functools
 import io
 import itertools
 import math
-import pickle
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable
 from pathlib import Path
@@ -28,7 +27,6 @@ import softrobots as sr
 from softrobots.description.expansion import expand
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.description.tag_reader import read_tags
-from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import HelixTube
 from softrobots.statics.kinematics import frame_placement
 from softrobots.view.body import body_at
@@ -746,10 +744,6 @@ def two_hinges() -> str:
     return HelixTube(length=0.2, chain="lumped", hinges=2).urdf()
 
 
-def rest_of(text: str) -> list[float]:
-    return [float(number) for number in ElementTree.fromstring(text).find(f"{{{NAMESPACE}}}section").get("rest").split()]
-
-
 MOVED = [
     (within_joint(f"{SECTION}_u2", "origin", xyz="0.0 0.0 1e-6"), f"{SECTION}_u2 .* not where the rest shape"),
     (within_joint(f"{SECTION}_u2", "origin", rpy="0.0 0.0 0.0"), f"{SECTION}_u2 .* not where the rest shape"),
@@ -794,20 +788,6 @@ def test_an_inflated_section_that_does_not_exist_is_refused() -> None:
     assert text != one_section()
     with pytest.raises(sr.DescriptionError, match=f"names the springs {SECTION}_bend_x {SECTION}_bend_z"):
         sr.load_model(text)
-
-
-@pytest.mark.parametrize("form", FORMS)
-def test_robot_text_and_pickle_give_equal_models(form: str) -> None:
-    robot, model = tube("paper", form), model_of("paper", form)
-    for twin in (sr.load_model(robot.urdf()), pickle.loads(pickle.dumps(model))):
-        assert twin == model
-        assert hash(twin) == hash(model)
-        a, b = (sr.solve_equilibrium(m, (), (0.02, -0.03, 0.01), gravity=sr.EARTH_GRAVITY) for m in (model, twin))
-        assert np.array_equal(a.q, b.q)
-    again = pickle.loads(pickle.dumps(robot))
-    assert again == robot
-    assert again.urdf() == robot.urdf()
-    assert model.n_motors == 0
 
 
 @pytest.mark.parametrize(

@@ -120,10 +120,3 @@ def test_nothing_is_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture) -
     assert run_script("helix_validation", ["--no-grid", "--cases", "0", "--no-plots", "--output", str(tmp_path)]) == 2
     assert "not empty" in capsys.readouterr().err
     assert [file.name for file in tmp_path.iterdir()] == ["mine.csv"]
-
-
-def test_help_tells_what_it_does(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script("helix_validation", ["--help"])
-    assert ended.value.code == 0
-    assert "--tolerance" in capsys.readouterr().out

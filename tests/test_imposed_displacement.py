@@ -224,29 +224,6 @@ def test_a_sequence_goes_on_where_it_was(limp: sr.SoftModel) -> None:
             assert other.reaction == pytest.approx(step.reaction, abs=1e-6)
 
 
-def test_robots_with_sections_can_be_pushed_too() -> None:
-    model = sr.load_model(sr.PccArm(segment_lengths=(0.5,), elastic_sections=2))
-    motors = model.relaxed_motors + [0.01, -0.01, 0.0]
-    held = sr.solve_imposed_displacement(model, motors, 0.005, direction=(1.0, 0.3, 0.0))
-    dead = sr.solve_equilibrium(model, motors, held.force, tolerance=1e-12)
-    assert np.allclose(dead.q_springs, held.q_springs, rtol=0.0, atol=1e-9)
-    assert held.stable
-
-
-@pytest.mark.parametrize("along", [None, (1, 0, 0)])
-def test_a_displaced_robot_survives_a_file(limp: sr.SoftModel, along: object, tmp_path: Path) -> None:
-    held = sr.solve_imposed_displacement(
-        limp, (0.1, 0.2, 0.3), 0.2, direction=(0, 0, 1), along=along, gravity=sr.EARTH_GRAVITY, tolerance=1e-9
-    )
-    again = sr.load_result(sr.save_result(held, tmp_path / "held.npz"))
-    assert isinstance(again, sr.ImposedDisplacement)
-    assert again.probe.same_as(held.probe)
-    assert (again.displacement, again.reaction, again.stable) == (held.displacement, held.reaction, held.stable)
-    assert again.equilibrium.tolerance == held.equilibrium.tolerance
-    for name in ("q", "q_springs", "force", "contact", "tangent_stiffness", "gradient"):
-        assert np.array_equal(getattr(again, name), getattr(held, name)), name
-
-
 @each_row(("name", "change"), [("q_springs", 1e-8), ("reaction", 1e-5), ("displacement", 1e-9), ("origin", 1e-9)])
 def test_a_file_that_is_not_in_balance_is_refused(limp: sr.SoftModel, name: str, change: float, tmp_path: Path) -> None:
     held = sr.solve_imposed_displacement(limp, (0.1, 0.2, 0.3), 0.05, direction=(0, 0, 1))

@@ -7,7 +7,6 @@ import pytest
 from scipy.optimize import minimize
 
 import softrobots as sr
-from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.inverse_kinematics import elbow_side
 from softrobots.statics.kinematics import frame_placement
 from tests.support.oracles import flexible_table, rigid_table
@@ -15,19 +14,6 @@ from tests.support.tables import each_row
 
 FORCE = (0.0, 10.0, -15.0)
 TOLERANCE = 1e-9  # what `solve_ik` promises [m]
-
-
-@pytest.mark.study
-@pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])
-@pytest.mark.parametrize("method", METHODS)
-def test_the_loaded_tip_arrives(arm: sr.SoftModel, method: str, gravity: tuple | None, rng: np.random.Generator) -> None:
-    for _ in range(5):
-        target = sr.solve_equilibrium(arm, rng.uniform(-2.5, 2.5, 3), FORCE, gravity=gravity).tip_position
-        found = sr.solve_ik(arm, target, FORCE, gravity=gravity, method=method)
-        check = sr.solve_equilibrium(arm, found.q_motors, FORCE, gravity=gravity)  # afresh, from relaxed springs
-        assert np.linalg.norm(check.tip_position - target) < 2 * TOLERANCE
-        assert found.error <= TOLERANCE
-        assert found.equilibrium.stable
 
 
 def test_without_load_it_is_the_rigid_arms_own_solution(arm: sr.SoftModel) -> None:

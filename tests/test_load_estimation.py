@@ -23,7 +23,7 @@ def true_case(
 
 
 @pytest.mark.study
-@pytest.mark.shortened(2_000, 10_000)
+@pytest.mark.shortened(500, 10_000)
 def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel, cases: int) -> None:
     """1e-6 relative in at least 99 % of 10 000 cases at 18 N; each miss is a pose near a singular one."""
     rng, found = np.random.default_rng(0), 0
@@ -342,10 +342,10 @@ def test_the_force_is_within_its_errors(arm: sr.SoftModel) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(1500, 6000)
+@pytest.mark.shortened(500, 6000)
 @pytest.mark.parametrize("kind", ["arm", "two hinges", "three links"])
 def test_the_force_is_within_its_errors_in_95_of_100_cases(kind: str, cases: int) -> None:
-    """6000 repetitions, standard error 0.28 %: 94 to 96 %; twice that of the 1500 of the gate."""
+    """6000 repetitions, standard error 0.28 %: 94 to 96 %; 3.5 times that of the 500 of the gate."""
     assert coverage(measured_robot(kind), cases, 1) == pytest.approx(0.95, abs=0.01 * np.sqrt(6000 / cases))
 
 
@@ -490,15 +490,16 @@ def estimated(robot: sr.SoftModel, motors: np.ndarray, torques: np.ndarray, rest
 
 
 @pytest.mark.study
+@pytest.mark.shortened(200, 400)
 @pytest.mark.parametrize("n_links", [3, 4, 5])
-def test_arms_of_many_links_are_estimated_as_by_brute_force(n_links: int) -> None:
-    """400 random cases at 10 to 100 N: the true force comes back in 99 %, more often than without starting again.
+def test_arms_of_many_links_are_estimated_as_by_brute_force(n_links: int, cases: int) -> None:
+    """Random cases at 10 to 100 N: the true force comes back in 99 %, more often than without starting again.
 
     Where it does not, a direction is not observable, or brute force from 30 starts does not find it either.
     """
     robot, rng = sr.load_model(sr.InflatableArm(link_lengths=(0.6,) * n_links)), np.random.default_rng(n_links)
     alone = together = 0
-    for _ in range(400):
+    for _ in range(cases):
         motors, direction = rng.uniform(-np.pi, np.pi, robot.n_motors), rng.normal(size=3)
         force = rng.choice([10.0, 18.0, 50.0, 100.0]) * direction / np.linalg.norm(direction)
         torques = sr.solve_equilibrium(robot, motors, force, tolerance=1e-13).motor_torques
@@ -508,15 +509,16 @@ def test_arms_of_many_links_are_estimated_as_by_brute_force(n_links: int) -> Non
         alone, together = alone + back[0], together + back[1]
         if not back[1] and not len(found[1].unobservable_directions):
             assert not by_brute_force(robot, motors, torques, 100.0 * rng.normal(size=(30, 3)))
-    assert together >= 396
-    assert together > alone
+    assert together >= 0.99 * cases
+    assert together > alone or alone == cases
 
 
 @pytest.mark.study
-def test_most_of_several_explanations_are_found(arm: sr.SoftModel) -> None:
+@pytest.mark.shortened(20, 60)
+def test_most_of_several_explanations_are_found(arm: sr.SoftModel, cases: int) -> None:
     """Of the forces below 300 N that brute force finds beside the kept one, in 60 random cases, three of five."""
     rng, there, found_there = np.random.default_rng(12), 0, 0
-    for _ in range(60):
+    for _ in range(cases):
         motors, _force, truth = true_case(arm, rng, 20.0)
         found = sr.estimate_load(arm, motors, truth.motor_torques)
         forces = [one.force for one in (found, *found.alternatives)]
@@ -525,5 +527,5 @@ def test_most_of_several_explanations_are_found(arm: sr.SoftModel) -> None:
             if np.linalg.norm(other - forces[0]) > 0.1 and np.linalg.norm(other) < 300.0:
                 there += 1
                 found_there += min(np.linalg.norm(other - one) for one in forces) < 0.1
-    assert there > 5
+    assert there > 0.08 * cases
     assert found_there >= 0.6 * there

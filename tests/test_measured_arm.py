@@ -335,10 +335,3 @@ def test_pictures_and_the_page_are_written(tmp_path: Path, capsys: pytest.Captur
     for name in ("axes", "errors", "tips", "paths", "families"):
         assert (tmp_path / "out" / f"measured_{name}.png").stat().st_size > 10_000
         assert (CHECKOUT / "docs" / "images" / f"measured_{name}.png").stat().st_size > 10_000
-
-
-def test_help_tells_what_it_does(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script("measured_arm", ["--help"])
-    assert ended.value.code == 0
-    assert "--pretension" in capsys.readouterr().out

@@ -19,7 +19,6 @@ from studies.measured_arm.fit_tables import compared_table, fit_table
 from studies.measured_arm.fitted import PRIORS, SETS, command, rows_of, start
 from studies.measured_arm.recordings import FOLDER
 from tests.conftest import CHECKOUT
-from tests.support.scripts import run_script
 
 LENGTHS = np.array([0.060, 0.0625, 0.064])
 STICK = 1e-4  # rad
@@ -126,11 +125,3 @@ def test_the_fit_starts_from_the_robot_of_the_folder() -> None:
     assert isinstance(robot, sr.TendonArm)
     assert robot == sr.TendonArm(elastic_sections=1, bending_friction=1e-3)
     assert start(rubs=False) == sr.TendonArm(elastic_sections=1)
-
-
-def test_the_script_tells_what_it_does(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script("measured_arm_fit", ["--help"])
-    assert ended.value.code == 0
-    assert "--compare" in capsys.readouterr().out
-    assert run_script("measured_arm_fit", ["--docs", "nowhere"]) == 2

@@ -171,13 +171,6 @@ def test_results_cannot_be_changed(arm: sr.SoftModel) -> None:
     assert result.tip_position[0] > 1.0
 
 
-def test_a_model_survives_pickling(arm: sr.SoftModel) -> None:
-    twin = pickle.loads(pickle.dumps(arm))
-    assert twin.spring_table == arm.spring_table
-    a, b = (sr.solve_equilibrium(m, (0.3, 0.6, -0.8), (0, 10, -15)).q_springs for m in (arm, twin))
-    assert np.array_equal(a, b)
-
-
 def test_threads_share_a_model_and_get_identical_bytes(arm: sr.SoftModel) -> None:
     def job(number: int) -> bytes:
         random = np.random.default_rng(number)

@@ -175,7 +175,7 @@ def test_flexures_carry_no_actuators() -> None:
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
     ("rod", "form", "force", "bends", "steps"),
-    [(TPU, "lumped", 0.1, 11, 1100), (TPU, "flexures", 0.3, 12, 1300), (STEEL, "flexures", 0.6, 12, 2400)],
+    [(TPU, "lumped", 0.1, 10, 500), (TPU, "flexures", 0.3, 11, 600), (STEEL, "flexures", 0.6, 12, 1300)],
     ids=["pairs", "flexures", "steel"],
 )
 def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
@@ -183,10 +183,10 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
 ) -> None:
     """30 pairs of hinges or flexures, undamped, released upright from a sideways force, with steps by default.
 
-    The reference, by its polynomials and its steps in 0.05 s, is five times as good.
+    The reference is five times as good, by one with a polynomial and a fifth of the steps in 0.05 s less.
     """
     fine = _path(dataclasses.replace(rod, bends=bends), force, 10.0, 200, steps)
-    coarse = _path(dataclasses.replace(rod, bends=bends - 1), force, 10.0, 200, steps)
+    coarse = _path(dataclasses.replace(rod, bends=bends - 1), force, 10.0, 200, 4 * steps // 5)
     assert np.linalg.norm(fine - coarse, axis=1).mean() < 1e-4
     model = chain(rod, 30, form, extension=rod.stretches > 0)
     start = sr.solve_equilibrium(model, (), force=(force, 0.0, 0.0), gravity=(0.0, 0.0, -9.81))
@@ -199,8 +199,8 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
 @pytest.mark.parametrize(
     "engine",
     [
-        pytest.param("general", marks=pytest.mark.shortened(10, 50)),
-        pytest.param("compiled", marks=pytest.mark.shortened(200, 1600)),
+        pytest.param("general", marks=pytest.mark.shortened(5, 50)),
+        pytest.param("compiled", marks=pytest.mark.shortened(40, 1600)),
     ],
 )
 def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
@@ -212,7 +212,7 @@ def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
         if engine == "compiled":
             if kind in ("limp", "foreign", "tendons") or (model.muscles and model.muscle_input == "lengths"):
                 continue  # plateaus, side branches, elastic tendons and lengths of muscles are refused there
-            simulate = sr.compile(model).simulate
+            simulate = sr.compile(model, backend=None if cases > 100 else "python").simulate  # numba compiles each for seconds
         for _ in range(cases):
             runs += 1
             push = law_robots.PUSHES[kind] * 10.0 ** rng.uniform(-2.0, 0.5) * rng.normal(size=3)
@@ -225,13 +225,13 @@ def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
                 failed += 1
                 continue
             assert all(np.all(np.isfinite(values)) for values in (moved.q_springs, moved.velocities, moved.tip_position))
-            if engine == "general" or runs % 50 == 0:  # Pinocchio computes those of compiled motion, slowly
+            if engine == "general" or runs % 20 == 0:  # Pinocchio computes those of compiled motion, slowly
                 assert np.all(np.isfinite(moved.energy.balance))
     assert failed < runs / 100, (failed, runs)
 
 
 @pytest.mark.study
-@pytest.mark.shortened(6, 200)
+@pytest.mark.shortened(3, 200)
 def test_random_pulses_and_moving_motors_keep_their_energy(cases: int) -> None:
     """Loads that jump at round times, motors that move, steps that are chosen, both engines: the tip agrees, energy is kept."""
     rng, model = np.random.default_rng(8), sr.load_model(sr.InflatableArm())

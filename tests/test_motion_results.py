@@ -13,7 +13,7 @@ import softrobots as sr
 from softrobots.view.animation_frames import motion_frames, playing_time
 from softrobots.view.figures import motions
 from softrobots.view.scene import SceneBuilder
-from tests.support.saved_files import altered, same
+from tests.support.saved_files import altered
 
 PUSH = (0.0, 10.0, -15.0)
 
@@ -37,17 +37,6 @@ def bending() -> sr.Motion:
     """An arm of muscles, let fall aside."""
     model = sr.load_model(sr.PccArm(elastic_sections=2))
     return sr.simulate(model, 0.1, model.relaxed_motors, force=(3, 0, 0), time_step=0.01, output_step=0.02)
-
-
-@pytest.mark.parametrize("suffix", ["npz", "json"])
-@pytest.mark.parametrize("which", ["released", "bending"])
-def test_a_saved_motion_comes_back_equal(which: str, suffix: str, request: pytest.FixtureRequest, tmp_path: Path) -> None:
-    motion = request.getfixturevalue(which)
-    again = sr.load_result(sr.save_result(motion, tmp_path / f"a.{suffix}"))
-    same(motion, again)
-    assert np.array_equal(again.tip_position, motion.tip_position)
-    with pytest.raises(ValueError, match="read-only"):
-        again.q_springs[0, 0] = 1.0
 
 
 def test_a_simulation_goes_on_from_a_saved_motion(released: sr.Motion, tmp_path: Path) -> None:

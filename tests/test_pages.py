@@ -309,17 +309,6 @@ def test_the_moving_picture_of_the_readme(tool: Callable[[str], ModuleType]) -> 
     assert changed(first, last) < 2.0 * changed(first, second)  # no jump
 
 
-@pytest.mark.parametrize("script", ["make_pages", "make_pictures"])
-def test_the_scripts_explain_themselves(script: str, capsys: pytest.CaptureFixture[str]) -> None:
-    for arguments, status in ((["--help"], 0), (["--only", "nothing"], 2)):
-        with pytest.raises(SystemExit) as ended:
-            run_script(script, arguments)
-        assert ended.value.code == status
-    out, err = capsys.readouterr()
-    assert "(docs/" in out
-    assert "invalid choice: 'nothing'" in err
-
-
 def test_a_folder_that_is_a_file_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     (tmp_path / "file").write_text("keep", encoding="utf-8")
     assert run_script("make_pages", ["--only", "inflatable_arm", "--output", str(tmp_path / "file")]) == 2

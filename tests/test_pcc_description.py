@@ -6,7 +6,6 @@ import functools
 import io
 import itertools
 import math
-import pickle
 import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Callable, Sequence
@@ -690,10 +689,6 @@ def with_mimic(name: str, master: str) -> Callable[[ElementTree.Element], None]:
     return change
 
 
-def turned_muscle(root: ElementTree.Element) -> None:
-    root.find(f"{{{NAMESPACE}}}actuator[@name='muscle_1_1']/*").set("azimuth", "2.0943951023932 2.0943951023932")
-
-
 JOINTS_ = "section_1_1_u1 section_1_1_u2 section_1_1_c section_1_1_r1 section_1_1_r2 section_1_1_r3"
 FIVE = JOINTS_.rsplit(" ", 1)[0]
 ROLE = f"{{{NAMESPACE}}}role"
@@ -869,20 +864,6 @@ def test_robot_and_its_text_give_equal_models(chain: str) -> None:
     strains = 2 * (4 * 2 if chain == "sections" else 4 * 3)
     assert (model.n_springs, pulled.n_springs) == (strains - 6, strains)  # lengths fix three sums a segment
     assert model != sr.load_model(PccArm(segment_lengths=(0.4, 0.3), chain=chain, elastic_sections=2, hinges=3, radius=0.04))
-
-
-@pytest.mark.parametrize("chain", ["sections", "lumped"])
-@pytest.mark.parametrize("muscles", ["lengths", "forces"])
-def test_a_model_survives_pickling(chain: str, muscles: str) -> None:
-    robot = PccArm(segment_lengths=(0.4,), chain=chain, elastic_sections=2, hinges=3)
-    model = sr.load_model(robot, muscles=muscles)
-    twin = pickle.loads(pickle.dumps(model))
-    assert twin == model
-    assert twin.muscle_input == muscles
-    given_ = model.relaxed_motors + 0.01 * np.arange(3)
-    a, b = (sr.solve_equilibrium(m, given_, (0.3, 0.2, -0.5)) for m in (model, twin))
-    assert np.array_equal(a.q, b.q)
-    assert np.array_equal(pickle.loads(pickle.dumps(robot)).urdf(), robot.urdf())
 
 
 # --- The body

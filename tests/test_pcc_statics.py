@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Mapping
 from functools import cache
 from pathlib import Path
@@ -11,7 +10,7 @@ import numpy as np
 import pinocchio as pin
 import pytest
 from scipy.linalg import expm, null_space
-from scipy.optimize import brentq, minimize
+from scipy.optimize import brentq
 
 import softrobots as sr
 from softrobots.constant_curvature import arc_from_muscles, chain_transform
@@ -332,38 +331,6 @@ def test_tangent_and_coupling_are_derivatives_of_the_residual(muscles: str, fiel
         assert (np.abs(state.tangent - state.tangent.T).max() < 1e-12 * np.abs(tangent).max()) == load.conservative
 
 
-@pytest.mark.parametrize(("muscles", "fields"), CASES[:3], ids=NAMES[:3])
-def test_equilibrium_is_the_minimum_that_scipy_finds(muscles: str, fields: dict, rng: np.random.Generator) -> None:
-    """BFGS on the energy above over all strains (lengths: over those that keep them), scaled by the stiffness.
-
-    It stops at gradients of 1e-6 (rounding of numerical ones) with curvature about 1: 1e-5 in scaled coordinates, over the
-    root of the softest stiffness, about 3 N m/rad."""
-    arm, oracle = model(muscles, **fields), Oracle(sr.PccArm(**fields))
-    forces, motors = {"segment_1": MID, "tip": TIP}, motors_of(rng, arm, oracle)
-    found = sr.solve_equilibrium(arm, motors, wrench=POINT_FORCES)
-    softness = 1.0 / np.sqrt(oracle.stiffness.ravel())
-    held = muscles == "lengths"
-    back = np.linalg.pinv(oracle.muscles * softness)
-    basis = null_space(oracle.muscles * softness) if held else np.eye(4 * len(oracle.h))
-    tensions = None if held else motors
-
-    def z(x: np.ndarray) -> np.ndarray:
-        at = softness * (basis @ x)
-        for _ in range(8 if held else 0):  # twist changes the lengths a little: each step leaves a hundredth
-            at = at + softness * (back @ (motors - oracle.lengths(at)))
-        return at.reshape(-1, 4)
-
-    def energy(x: np.ndarray) -> float:
-        return oracle.energy(z(x), forces, None, tensions)
-
-    best = minimize(energy, np.zeros(basis.shape[1]), method="BFGS", options={"gtol": 1e-6})
-    assert np.abs(coordinates(found, oracle) - z(best.x)).max() < 1e-5
-    assert np.linalg.norm(found.tip_position - oracle.poses(z(best.x))[0]["tip"][:3, 3]) < 1e-5
-    own = oracle.energy(coordinates(found, oracle), forces, None, tensions)
-    assert own <= best.fun + 1e-12  # nothing lower was found
-    assert found.stable
-
-
 @pytest.mark.parametrize("fields", [{"elastic_sections": 2, **ODD}, {"chain": "lumped", "hinges": 3, **ODD}])
 def test_tension_is_minus_the_derivative_of_the_total_energy_by_the_length(fields: dict, rng: np.random.Generator) -> None:
     """Castigliano: over solved equilibria, elastic energy and potential of the forces by the oracle. Step 1e-5 m: truncation
@@ -411,44 +378,6 @@ def test_held_lengths_are_stable_where_held_forces_are_not() -> None:
 # ---------------------------------------------------------------------------------------------------------------------------
 # Sensitivities
 
-SENSITIVE = [(m, f) for m, f in CASES[:4]]
-
-
-@pytest.mark.parametrize(("muscles", "fields"), SENSITIVE, ids=NAMES[:4])
-def test_elastostatic_jacobian_matches_solved_equilibria(muscles: str, fields: dict, rng: np.random.Generator) -> None:
-    """Steps of 1e-6 m or 1e-3 N move the robot by about 1e-5 rad; equilibria are solved to 1e-13: bound 1e-6."""
-    arm, oracle = model(muscles, **fields), Oracle(sr.PccArm(**fields))
-    for wrench, gravity in ((POINT_FORCES, sr.EARTH_GRAVITY), ({"tip": np.r_[TIP, 0.2, -0.1, 0.3]}, None)):
-        motors = motors_of(rng, arm, oracle)
-
-        def tip(u: np.ndarray, wrench=wrench, gravity=gravity) -> np.ndarray:
-            return sr.solve_equilibrium(arm, u, wrench=wrench, gravity=gravity, tolerance=1e-13).tip_position
-
-        found = sr.elastostatic_jacobian(arm, sr.solve_equilibrium(arm, motors, wrench=wrench, gravity=gravity))
-        expected = central_difference(tip, motors, 1e-6 if muscles == "lengths" else 1e-3)
-        assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
-
-
-@pytest.mark.parametrize(("muscles", "fields"), SENSITIVE, ids=NAMES[:4])
-def test_compliance_matches_solved_equilibria_and_is_reciprocal(muscles: str, fields: dict, rng: np.random.Generator) -> None:
-    """Differences of poses under an added wrench of 1e-4 N or N m: turns of about 1e-5 rad."""
-    arm, oracle = model(muscles, **fields), Oracle(sr.PccArm(**fields))
-    motors = motors_of(rng, arm, oracle)
-    start = sr.solve_equilibrium(arm, motors, wrench=POINT_FORCES, gravity=sr.EARTH_GRAVITY, tolerance=1e-13)
-    rotation = start.transform_tip_to_world.rotation
-
-    def pose(extra: np.ndarray) -> np.ndarray:
-        wrench = POINT_FORCES | {"tip": POINT_FORCES["tip"] + extra}
-        moved = sr.solve_equilibrium(arm, motors, wrench=wrench, gravity=sr.EARTH_GRAVITY, tolerance=1e-13)
-        at = moved.transform_tip_to_world
-        return np.r_[at.translation, pin.log3(at.rotation @ rotation.T)]
-
-    expected, found = central_difference(pose, np.zeros(6), 1e-4), sr.compliance(arm, start)
-    assert np.abs(found - expected).max() < 1e-6 * np.abs(expected).max()
-    assert start.conservative
-    assert np.abs(found - found.T).max() < 1e-12 * np.abs(found).max()  # Maxwell-Betti
-    assert np.linalg.eigvalsh(found).min() > -1e-12 * np.abs(found).max()  # never against a push; held lengths may be rigid
-
 
 @pytest.mark.parametrize("muscles", ["lengths", "forces"])
 def test_maxwell_reciprocity_between_two_places(muscles: str) -> None:
@@ -465,17 +394,6 @@ def test_maxwell_reciprocity_between_two_places(muscles: str) -> None:
     cross = np.abs(found[:3, 3:]).max()
     assert cross > 1e-4
     assert np.abs(found - found.T).max() < 1e-6 * cross  # differences, as above
-
-
-def test_a_world_fixed_moment_is_not_conservative() -> None:
-    arm = model(**ODD)
-    lengths = np.array([0.34, 0.355, 0.36, 0.24, 0.26, 0.25])
-    found = sr.solve_equilibrium(arm, lengths, wrench=(1, 2, -1, 0.4, -0.3, 0.5))
-    assert not found.conservative
-    assert found.stable
-    assert np.abs(found.tangent_stiffness - found.tangent_stiffness.T).max() > 1e-3
-    compliance = sr.compliance(arm, found)
-    assert np.abs(compliance - compliance.T).max() > 1e-3 * np.abs(compliance).max()
 
 
 # ---------------------------------------------------------------------------------------------------------------------------
@@ -692,33 +610,6 @@ def test_turning_the_load_by_the_symmetry_of_the_muscles_turns_the_answer(
         assert np.abs(other.muscle_lengths - one.muscle_lengths[after]).max() < allowed
 
 
-@pytest.mark.parametrize("fields", [{}, {"chain": "lumped", "hinge_rule": "midpoint"}])
-@pytest.mark.parametrize("gravity", [None, (0, 3.0, -9.81)])
-def test_a_segment_cut_in_two_is_the_same_rod(fields: dict, gravity: tuple | None) -> None:
-    """To the solver's 1e-13; with gravity one more tiny link, at the cut, stands at a place of its own: 1e-8."""
-    name = "hinges" if "chain" in fields else "elastic_sections"
-    common = {"muscle_azimuths": (), "offset": 0.0, **fields}
-    whole = model(segment_lengths=(0.6,), **common, **{name: 8})
-    halves = model(segment_lengths=(0.3, 0.3), **common, **{name: 4})
-    wrench = np.array([1.0, 2.0, -1.0, 0.2, -0.1, 0.3])
-    one, two = (sr.solve_equilibrium(arm, (), wrench=wrench, gravity=gravity, tolerance=1e-13) for arm in (whole, halves))
-    poses = [found.transform_tip_to_world.homogeneous for found in (one, two)]
-    assert np.abs(poses[0] - poses[1]).max() < (1e-11 if gravity is None else 1e-7)
-    assert np.abs(one.strains - two.strains).max() < (1e-10 if gravity is None else 1e-5)  # stretch: 1e-3 N / 2400 N
-
-
-@pytest.mark.parametrize("factor", [0.01, 30.0])
-def test_stiffness_and_load_scaled_together_leave_the_shape(factor: float) -> None:
-    robot = sr.PccArm(**ODD)
-    names = ("bending_stiffness", "torsional_stiffness", "axial_stiffness")
-    harder = ODD | {name: tuple(factor * value for value in getattr(robot, name)) for name in names}
-    lengths, wrench = np.array([0.34, 0.355, 0.36, 0.24, 0.26, 0.25]), np.array([2.0, -1.0, 3.0, 0.1, 0.2, -0.1])
-    one = sr.solve_equilibrium(model(**ODD), lengths, wrench=wrench, tolerance=1e-13)
-    other = sr.solve_equilibrium(model(**harder), lengths, wrench=factor * wrench, tolerance=1e-13)
-    assert np.abs(one.strains - other.strains).max() < 1e-10
-    assert np.allclose(other.muscle_forces, factor * one.muscle_forces, rtol=1e-10)
-
-
 def test_one_section_a_segment_leaves_only_twist() -> None:
     """Pure constant curvature: a force in the plane moves nothing; a torque about the axis twists by M L / GJ."""
     arm = model(elastic_sections=1)
@@ -748,19 +639,6 @@ def test_one_section_a_segment_leaves_only_twist() -> None:
 # Load estimation and files
 
 
-def test_the_tip_force_comes_back_from_muscle_tensions(rng: np.random.Generator) -> None:
-    """Six tensions for three components; consistent ones leave nothing unexplained. Conditioning about 10: 1e-7 relative."""
-    for fields in ({}, {"chain": "lumped", "hinges": 4}):
-        arm = model(**fields)
-        for gravity in (None, sr.EARTH_GRAVITY):
-            lengths, force = random_lengths(rng, sr.PccArm(), 0.05), rng.uniform(-3, 3, 3)
-            truth = sr.solve_equilibrium(arm, lengths, force, gravity=gravity, tolerance=1e-13)
-            estimate = sr.estimate_load(arm, lengths, truth.muscle_forces, gravity=gravity)
-            assert np.linalg.norm(estimate.force - force) < 1e-7 * np.linalg.norm(force)
-            assert np.abs(estimate.equilibrium.strains - truth.strains).max() < 1e-6
-            assert len(estimate.unobservable_directions) == 0
-
-
 @pytest.mark.study
 def test_noise_of_the_tensions_spreads_as_the_covariance_says(rng: np.random.Generator) -> None:
     """60 noisy measurements; the scatter of a standard deviation over 60 is 9 %, five times that is allowed."""
@@ -776,22 +654,6 @@ def test_noise_of_the_tensions_spreads_as_the_covariance_says(rng: np.random.Gen
 def test_given_forces_feel_no_load() -> None:
     with pytest.raises(sr.ParameterError, match="muscles of given length"):
         sr.estimate_load(model("forces"), np.zeros(6), np.zeros(6))
-
-
-@pytest.mark.parametrize("fields", [{}, {"chain": "lumped", "hinges": 3}])
-@pytest.mark.parametrize("muscles", ["lengths", "forces"])
-def test_saved_equilibria_come_back_equal(muscles: str, fields: dict, tmp_path: Path) -> None:
-    arm = model(muscles, **fields)
-    motors = LENGTHS if muscles == "lengths" else np.array([5.0, -3.0, 2.0, -6.0, 4.0, 1.0])
-    wrench = {"segment_1": (0.5, 0, 0, 0, 0, 0.1), "tip": (0, 1, -0.5, 0, 0, 0)}
-    saved = sr.solve_equilibrium(arm, motors, wrench=wrench, gravity=sr.EARTH_GRAVITY)
-    loaded = sr.load_result(sr.save_result(saved, tmp_path / "a.npz"))
-    assert loaded.model == arm
-    assert loaded.model.muscle_input == muscles
-    assert loaded.model != model("forces" if muscles == "lengths" else "lengths", **fields)
-    for name in ("q_motors", "q_springs", "q", "muscle_lengths", "muscle_forces", "strains", "tip_position", "coupling"):
-        assert np.array_equal(getattr(loaded, name), getattr(saved, name)), name
-    assert (loaded.residual, loaded.stable) == (saved.residual, saved.stable)
 
 
 @pytest.mark.parametrize("change", [1e-6, 0.01])
@@ -898,9 +760,3 @@ def test_a_chain_without_stretch_refuses_lengths_that_need_it() -> None:
 def test_an_unknown_choice_of_muscles_is_refused(choice: object) -> None:
     with pytest.raises(sr.ParameterError, match=r"muscles.*'lengths', 'forces'"):
         sr.load_model(sr.PccArm(), muscles=choice)
-
-
-def test_models_copy_with_their_muscles() -> None:
-    again = copy.deepcopy(model("forces"))
-    assert again == model("forces")
-    assert again.muscle_input == "forces"

@@ -522,14 +522,6 @@ def test_the_script_refuses_bad_input(
     assert [path.name for path in tmp_path.iterdir()] == ["mine.txt"]
 
 
-def test_the_script_explains_itself(capsys: pytest.CaptureFixture) -> None:
-    for arguments, status in ((["--help"], 0), (["--paper", "another"], 2)):
-        with pytest.raises(SystemExit) as ended:
-            run_script("reproduce_papers", arguments)
-        assert ended.value.code == status
-    assert "usage:" in capsys.readouterr().out
-
-
 def _empty_page(checkout: Path) -> Path:
     script = _script()
     page = checkout / script.PAGE

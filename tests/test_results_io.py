@@ -32,16 +32,6 @@ def results(arm: sr.SoftModel) -> dict[str, object]:
     }
 
 
-@pytest.mark.parametrize("kind", ["equilibrium", "ik_solution", "load_estimate", "trajectory", "branches"])
-def test_what_is_saved_comes_back_equal(results: dict, kind: str, tmp_path: Path) -> None:
-    file = sr.save_result(results[kind], tmp_path / kind)
-    assert file.suffix == ".npz"
-    same(results[kind], sr.load_result(file))
-    text = sr.save_result(results[kind], tmp_path / f"{kind}.json")
-    assert json.loads(text.read_text(encoding="utf-8"))["kind"]["values"] == [kind]
-    same(results[kind], sr.load_result(text))
-
-
 def test_json_that_is_no_table_of_arrays_is_refused(results: dict, tmp_path: Path) -> None:
     """Of the right kind, the words say what is wrong; a number that JSON does not have is refused before it is written."""
     good = json.loads(sr.save_result(results["equilibrium"], tmp_path / "a.json").read_text(encoding="utf-8"))

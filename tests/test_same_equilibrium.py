@@ -382,10 +382,3 @@ def test_the_script_tells_of_a_tool_that_is_missing(monkeypatch: pytest.MonkeyPa
     monkeypatch.setattr("softrobots.cli.tools.known_tools.installed_version", lambda package: None)
     assert run_script(["--tools", "Drake"]) == 2
     assert "pip install 'softrobots[interop]'" in capsys.readouterr().err
-
-
-def test_the_script_has_help(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script(["--help"])
-    assert ended.value.code == 0
-    assert "--no-simulation" in capsys.readouterr().out

@@ -267,21 +267,6 @@ def test_the_recursion_of_the_paper_converges_below_the_plateau_and_says_so_beyo
         sr.solve_equilibrium(one, (0.0, 0.0), (0.0, 0.0, 20.0), method="fixed_point")
 
 
-def test_derivatives_of_the_tip_hold_on_the_plateau(limp: sr.SoftModel) -> None:
-    """Compliance and elastostatic Jacobian by central differences (1e-5 steps: errors about 1e-8 of the second derivative)."""
-    motors, force, step = np.array([0.2, 0.4, -0.5]), np.array([3.0, 25.0, -40.0]), 1e-5
-    loaded = sr.solve_equilibrium(limp, motors, force)
-    assert loaded.saturated == (True, False)
-
-    def tip(q: np.ndarray, f: np.ndarray) -> np.ndarray:
-        return sr.solve_equilibrium(limp, q, f, q_springs0=loaded.q_springs, tolerance=1e-13).tip_position
-
-    by_force = np.array([(tip(motors, force + row) - tip(motors, force - row)) / (2e-3) for row in 1e-3 * np.eye(3)]).T
-    by_motors = np.array([(tip(motors + row, force) - tip(motors - row, force)) / (2 * step) for row in step * np.eye(3)]).T
-    assert np.allclose(sr.compliance(limp, loaded)[:3, :3], by_force, rtol=0.0, atol=1e-7)
-    assert np.allclose(sr.elastostatic_jacobian(limp, loaded), by_motors, rtol=0.0, atol=1e-7)
-
-
 @pytest.mark.study
 @pytest.mark.parametrize("force", [(3.0, 10.0, -15.0), (3.0, 25.0, -30.0)])
 def test_load_estimation_finds_the_force_before_and_on_the_plateau(limp: sr.SoftModel, force: tuple[float, ...]) -> None:

@@ -11,6 +11,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.statics.trajectory import METHODS
+from tests.conftest import CHECKOUT, load_script
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
@@ -134,14 +135,16 @@ def test_ik_trajectory_refuses_a_folder_that_is_not_empty(tmp_path: Path, capsys
         assert "mine.txt is a file" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize(
-    "name", ["ik_trajectory", "generate_urdf", "solver_rates", "make_pictures", "helix_tube", "helix_atlas"]
-)
+@pytest.mark.parametrize("name", sorted(file.stem for file in (CHECKOUT / "scripts").glob("*.py")))
 def test_every_script_explains_itself(name: str, capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script(name, ["--help"])
-    assert ended.value.code == 0
-    assert "usage:" in capsys.readouterr().out
+    for arguments, status in ((["--help"], 0), (["--no-such-option"], 2)):
+        with pytest.raises(SystemExit) as ended:
+            run_script(name, arguments)
+        assert ended.value.code == status
+    out, err = capsys.readouterr()
+    purpose = load_script(name).__doc__.partition("\n")[0]
+    assert " ".join(purpose.split()) in " ".join(out.split())
+    assert "--no-such-option" in err
 
 
 def test_generate_urdf_checks_and_writes(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:

@@ -258,14 +258,6 @@ def test_values_at_straight() -> None:
     assert np.allclose(found.first, expected, atol=1e-15, rtol=0)
 
 
-@given(sections_)
-@settings(max_examples=60)
-def test_first_derivative_against_central_differences(z: np.ndarray) -> None:
-    """Step 1e-5: truncation 1e-10 / 6 times third derivatives of the joint angles, below 30 up to 2 rad of bending."""
-    difference = central_difference(lambda at: joint_positions(at, H), z, 1e-5)
-    assert np.allclose(SectionChain(z, H).first, difference, atol=1e-9, rtol=0)
-
-
 weights_ = st.lists(st.floats(-1.0, 1.0), min_size=6, max_size=6).map(np.array)
 
 

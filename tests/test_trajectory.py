@@ -37,19 +37,6 @@ def test_straight_line_is_straight_and_its_speed_peaks_at_15_eighths() -> None:
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("gravity", [None, sr.EARTH_GRAVITY])
-@pytest.mark.parametrize("method", ["newton", "fixed_point"])
-def test_every_waypoint_is_reached(arm: sr.SoftModel, method: str, gravity: tuple | None) -> None:
-    found = sr.follow_trajectory(arm, PATH.positions, FORCE, method=method, times=PATH.times, elbow="up", gravity=gravity)
-    assert found.tip_error.max() <= 1e-9
-    assert all(state.stable for state in found.equilibria)
-    assert np.abs(np.diff(found.q_motors, axis=0)).max() < 0.05  # one branch, no jump
-    for number in (0, 37, 100):  # afresh, from relaxed springs
-        again = sr.solve_equilibrium(arm, found.q_motors[number], FORCE, gravity=gravity)
-        assert np.allclose(again.tip_position, PATH.positions[number], atol=2e-9)
-
-
-@pytest.mark.study
 def test_methods_agree_on_the_motor_angles(arm: sr.SoftModel) -> None:
     """The paper's method with small steps and a high gain approaches the exact answer in proportion to 1 / gain."""
     exact = sr.follow_trajectory(arm, PATH.positions, FORCE, elbow="up")

@@ -362,24 +362,6 @@ def test_each_hinge_has_the_plateau_of_its_link() -> None:
 # --- The other questions
 
 
-@pytest.mark.study
-def test_the_solvers_take_it() -> None:
-    """Load from torques, motors from the tip, a path, and the compiled answers: each returns what the other was given."""
-    model = arm(torsion=True)
-    found = sr.solve_equilibrium(model, POSTURE, LOAD)
-    assert found.stable
-    estimate = sr.estimate_load(model, POSTURE, found.motor_torques)
-    assert estimate.force == pytest.approx(LOAD, abs=1e-7)
-    solution = sr.solve_ik(model, found.tip_position, LOAD, q_motors0=POSTURE)
-    assert solution.q_motors == pytest.approx(POSTURE, abs=1e-9)
-    slow = sr.solve_equilibrium(model, POSTURE, LOAD, method="fixed_point")
-    assert slow.q_springs == pytest.approx(found.q_springs, abs=1e-8)
-    compiled = sr.compile(model, backend="python")
-    batch = compiled.equilibria(np.array([POSTURE]), np.array([LOAD]))
-    assert batch.q_springs[0] == pytest.approx(found.q_springs, rel=1e-9)
-    assert compiled.estimate_load(POSTURE, found.motor_torques).force == pytest.approx(LOAD, abs=1e-7)
-
-
 @pytest.mark.parametrize(
     ("name", "module"),
     [

@@ -11,23 +11,12 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.description.third_party import UR5, robot_file
-from tests.conftest import missing
 from tests.support.scripts import run_script
 from tests.support.tables import each_row
 
-pytestmark = pytest.mark.study
+pytestmark = [pytest.mark.study, pytest.mark.usefixtures("ur5")]
 
 NAME = "ur5_with_soft_arm"
-
-
-@pytest.fixture(autouse=True)
-def ur5() -> Path:
-    try:
-        return robot_file(UR5)
-    except sr.MissingDependency as error:
-        missing(str(error))
-        raise
 
 
 def test_the_default_brings_the_loaded_tip_back(tmp_path: Path, ur5: Path, capsys: pytest.CaptureFixture) -> None:
@@ -76,13 +65,6 @@ def test_a_line_is_followed_with_the_loaded_tip(tmp_path: Path, capsys: pytest.C
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     assert summary["tip_error_before_m"] > 0.1
     assert "WARNING: a link wrinkles" in capsys.readouterr().out
-
-
-def test_it_explains_itself(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script(NAME, ["--help"])
-    assert ended.value.code == 0
-    assert "--keep-orientation" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("robot", ["helix_tube", "pcc_arm"])

@@ -15,7 +15,6 @@ import pytest
 import softrobots as sr
 from softrobots.cli import main as cli
 from softrobots.dynamics.damping import damping_matrix
-from softrobots.dynamics.equations import EquationsOfMotion
 from tests.support.law_robots import model
 from tests.support.rods import cantilever_frequencies
 
@@ -207,37 +206,6 @@ def test_an_unstable_equilibrium_and_massless_springs_are_refused_but_can_be_lin
 
 
 # --- Linear models
-
-
-@pytest.mark.parametrize("kind", ["arm", "pcc", "pulled", "pcc_lumped", "helix", "mounted"])
-def test_a_linear_model_is_the_derivative_of_the_full_equations_of_motion(kind: str) -> None:
-    """Central differences of `EquationsOfMotion.balance` in positions, rates and accelerations; 1e-7 of its largest entry."""
-    robot, random = model(kind), np.random.default_rng(5)
-    found = sr.solve_equilibrium(robot, robot.relaxed_motors, (0.3, 0.1, -0.2), gravity=sr.EARTH_GRAVITY)
-    equations = EquationsOfMotion(robot, sr.EARTH_GRAVITY, damping_matrix(robot, 0.02))
-    wrenches = {robot.tip: np.array([0.3, 0.1, -0.2, 0.0, 0.0, 0.0])}
-    at, count = np.concatenate([found.q_motors, found.q_springs]), robot.n_motors + robot.n_springs
-    scale = np.concatenate([robot.motor_scale, np.ones(robot.n_springs)])
-    placed = robot.n_motors - (len(robot.muscles) if robot.muscle_input == "forces" else 0)
-    for driven in ("prescribed", "torque"):
-        linear = sr.linearize(robot, found, motors=driven, damping_time=0.02)
-        way, rates = random.normal(size=count) * scale, random.normal(size=count) * scale
-        rates[placed : robot.n_motors] = 0.0
-        kept = np.r_[:placed, robot.n_motors : count]
-        inputs = np.concatenate([random.normal(size=placed), way[placed : robot.n_motors], np.zeros(3)])
-        states = np.concatenate([way[kept], rates[kept]])
-        accelerations = np.zeros(count)
-        accelerations[kept] = (linear.A @ states + linear.B @ inputs)[len(kept) :]
-        sides = [equations.balance(at + step * way, step * rates, step * accelerations, wrenches) for step in (1e-6, -1e-6)]
-        slope = (sides[0] - sides[1]) / 2e-6
-        size = np.abs(robot.stiffness).max() * np.abs(way).max() + np.abs(accelerations).max()
-        assert np.abs(slope[robot.n_motors :]).max() < 1e-7 * size
-        outputs = linear.C @ states + linear.D @ inputs
-        exerted = inputs[:placed] if driven == "torque" else -outputs[6:]
-        assert np.abs(slope[:placed] - exerted).max(initial=0.0) < 1e-7 * size
-        for names, units in ((linear.input_names, linear.input_units), (linear.output_names, linear.output_units)):
-            for name, unit in zip(names, units, strict=True):
-                assert not name.endswith(("_torque", "_force")) or unit == ("N m" if name.endswith("_torque") else "N")
 
 
 @pytest.mark.study

@@ -410,13 +410,6 @@ def test_the_script_writes_map_and_picture(tmp_path: Path, capsys: pytest.Captur
     assert file.read_bytes() == before
 
 
-def test_the_script_explains_itself(capsys: pytest.CaptureFixture) -> None:
-    with pytest.raises(SystemExit) as ended:
-        run_script("workspace_map", ["--help"])
-    assert ended.value.code == 0
-    assert "--scheduler ADDRESS" in capsys.readouterr().out
-
-
 @pytest.mark.study
 @each_row(
     ("arguments", "message"),

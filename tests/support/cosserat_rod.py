@@ -9,6 +9,7 @@ world axes; SI units.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,55 +25,77 @@ NO_LOAD = (0.0,) * 6
 
 @njit(cache=True)
 def _cross(a, b):  # type: ignore[no-untyped-def]
-    return np.array([a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]])
+    return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
 
 
 @njit(cache=True)
 def _turned(q, v, sign):  # type: ignore[no-untyped-def]
     """A vector turned by a unit quaternion, or back with sign -1."""
-    t = 2.0 * _cross(q[1:], v)
-    return v + sign * q[0] * t + _cross(q[1:], t)
+    axis = q[1], q[2], q[3]
+    t = _cross(axis, v)
+    c = _cross(axis, t)
+    w = sign * q[0]
+    return v[0] + 2.0 * (w * t[0] + c[0]), v[1] + 2.0 * (w * t[1] + c[1]), v[2] + 2.0 * (w * t[2] + c[2])
 
 
 @njit(cache=True)
-def _rates(y, wrench, gravity, h, stiff, mass, inertia, tau, drag):  # type: ignore[no-untyped-def]
+def _three(y, j, k):  # type: ignore[no-untyped-def]
+    return y[j, k], y[j, k + 1], y[j, k + 2]
+
+
+@njit(cache=True)
+def _rates(y, rate, wrench, gravity, h, stiff, mass, inertia, tau, drag):  # type: ignore[no-untyped-def]
     """Time derivative of a state (cells, 13): position and velocity of the far end of each cell, its quaternion and body rate.
 
     `stiff` are shear, shear and axial stiffness [N], then both of bending and torsion [N m^2]; `inertia` is that of a cell.
+    Vectors are tuples: numba compiles these in a tenth of the time.
     """
     cells = len(y)
-    rate, pull, torque = np.zeros_like(y), np.zeros_like(y[:, :3]), np.zeros_like(y[:, :3])
-    x, v, q, w = np.zeros_like(y[0, :3]), np.zeros_like(y[0, :3]), np.zeros_like(y[0, :4]), np.zeros_like(y[0, :3])
-    q[0] = 1.0
+    pull, torque = np.zeros((cells, 3)), np.zeros((cells, 3))
+    x, v, w, q = (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), (1.0, 0.0, 0.0, 0.0)
     for j in range(cells):
-        q_j, w_j = y[j, 6:10], y[j, 10:]
-        u = q_j / np.sqrt(np.sum(q_j * q_j))
-        edge = _turned(u, (y[j, :3] - x) / h, -1.0)
-        edge_rate = _turned(u, (y[j, 3:6] - v) / h, -1.0) - _cross(w_j, edge)
-        strain = edge + tau * edge_rate
-        strain[2] -= 1.0
-        inner = stiff[:3] * strain
-        pull[j] = _turned(u, inner, 1.0)
-        s = np.sum(q * u)  # relative quaternion (s, b) of this cell to the one before, or to the clamp
-        b = q[0] * u[1:] - u[0] * q[1:] - _cross(q[1:], u[1:])
-        b_rate = 0.5 * (s * (w_j - w) + _cross(b, w + w_j))
-        moment = (2.0 / h if j else 4.0 / h) * stiff[3:] * (b + tau * b_rate)
-        torque[j] += h * _cross(edge, inner) - s * moment - _cross(moment, b)
-        if j:
-            torque[j - 1] += s * moment + _cross(b, moment)
-        rate[j, 6] = -0.5 * np.sum(q_j[1:] * w_j)
-        rate[j, 7:10] = 0.5 * (q_j[0] * w_j + _cross(q_j[1:], w_j))
-        x, v, q, w = y[j, :3], y[j, 3:6], u, w_j
+        a, end, speed, w_j = y[j, 6], _three(y, j, 0), _three(y, j, 3), _three(y, j, 10)
+        axis = _three(y, j, 7)
+        size = math.sqrt(a * a + axis[0] ** 2 + axis[1] ** 2 + axis[2] ** 2)
+        u = a / size, axis[0] / size, axis[1] / size, axis[2] / size
+        edge = _turned(u, ((end[0] - x[0]) / h, (end[1] - x[1]) / h, (end[2] - x[2]) / h), -1.0)
+        moved = _turned(u, ((speed[0] - v[0]) / h, (speed[1] - v[1]) / h, (speed[2] - v[2]) / h), -1.0)
+        spin = _cross(w_j, edge)
+        inner = (
+            stiff[0] * (edge[0] + tau * (moved[0] - spin[0])),
+            stiff[1] * (edge[1] + tau * (moved[1] - spin[1])),
+            stiff[2] * (edge[2] + tau * (moved[2] - spin[2]) - 1.0),
+        )
+        outer = _turned(u, inner, 1.0)
+        s = q[0] * u[0] + q[1] * u[1] + q[2] * u[2] + q[3] * u[3]  # relative quaternion (s, b) to the cell before, or the clamp
+        c = _cross((q[1], q[2], q[3]), (u[1], u[2], u[3]))
+        b = q[0] * u[1] - u[0] * q[1] - c[0], q[0] * u[2] - u[0] * q[2] - c[1], q[0] * u[3] - u[0] * q[3] - c[2]
+        c = _cross(b, (w[0] + w_j[0], w[1] + w_j[1], w[2] + w_j[2]))
+        m = 2.0 / h if j else 4.0 / h
+        moment = (
+            m * stiff[3] * (b[0] + 0.5 * tau * (s * (w_j[0] - w[0]) + c[0])),
+            m * stiff[4] * (b[1] + 0.5 * tau * (s * (w_j[1] - w[1]) + c[1])),
+            m * stiff[5] * (b[2] + 0.5 * tau * (s * (w_j[2] - w[2]) + c[2])),
+        )
+        lever, c, turn = _cross(edge, inner), _cross(b, moment), _cross(axis, w_j)
+        for k in range(3):
+            pull[j, k] = outer[k]
+            torque[j, k] += h * lever[k] - s * moment[k] + c[k]
+            if j:
+                torque[j - 1, k] += s * moment[k] + c[k]
+            rate[j, k] = speed[k]
+            rate[j, 7 + k] = 0.5 * (a * w_j[k] + turn[k])
+        rate[j, 6] = -0.5 * (axis[0] * w_j[0] + axis[1] * w_j[1] + axis[2] * w_j[2])
+        x, v, q, w = end, speed, u, w_j
+    last = _turned(q, (wrench[3], wrench[4], wrench[5]), -1.0)
     for j in range(cells):
-        rate[j, :3] = y[j, 3:6]
-        beyond = pull[j + 1] if j + 1 < cells else pull[j] * 0.0 + wrench[:3]
-        rate[j, 3:6] = (beyond - pull[j]) / (mass if j + 1 < cells else mass / 2.0) + gravity - drag * y[j, 3:6]
-        w_j = y[j, 10:]
-        if j + 1 == cells:
-            u = y[j, 6:10] / np.sqrt(np.sum(y[j, 6:10] * y[j, 6:10]))
-            torque[j] += _turned(u, torque[j] * 0.0 + wrench[3:], -1.0)
-        rate[j, 10:] = (torque[j] - _cross(w_j, inertia * w_j)) / inertia - drag * w_j
-    return rate
+        w_j, tip = _three(y, j, 10), j + 1 == cells
+        gyro = _cross(w_j, (inertia[0] * w_j[0], inertia[1] * w_j[1], inertia[2] * w_j[2]))
+        for k in range(3):
+            beyond = wrench[k] if tip else pull[j + 1, k]
+            rate[j, 3 + k] = (beyond - pull[j, k]) / (mass / 2.0 if tip else mass) + gravity[k] - drag * y[j, 3 + k]
+            carried = torque[j, k] + (last[k] if tip else 0.0)
+            rate[j, 10 + k] = (carried - gyro[k]) / inertia[k] - drag * w_j[k]
 
 
 @dataclass(frozen=True)
@@ -123,14 +146,16 @@ class CosseratRod(RoundRod):
         stiff = np.array([self.shear * self.axial] * 2 + [self.axial] + [self.bending] * 2 + [self.torsion])
         mass = self.density * self.area * h
         inertia = mass * self.radius**2 * np.array([0.25, 0.25, 0.5])
-        loads = np.asarray(wrench, dtype=float), np.array(self.gravity)
-        return _rates(state.reshape(-1, 13), *loads, h, stiff, mass, inertia, self.retardation, drag).ravel()
+        loads, found = (np.asarray(wrench, dtype=float), np.array(self.gravity)), np.zeros((self.cells, 13))
+        _rates(state.reshape(-1, 13), found, *loads, h, stiff, mass, inertia, self.retardation, drag)
+        return found.ravel()
 
     def slopes(self, state: np.ndarray, wrench: Any = NO_LOAD, drag: float = 0.0) -> csc_matrix:
-        """Jacobian of `rates`, by complex steps: each cell knows its neighbours only, so that 39 columns give it."""
+        """Jacobian of `rates`, by central differences: each cell knows its neighbours only, so that 39 columns give it."""
         index = np.arange(13 * self.cells)
-        steps = 1e-20j * (index % 39 == np.arange(39)[:, None])
-        found = np.array([self.rates(state + step, wrench, drag).imag for step in steps]).T / 1e-20
+        steps = 1e-6 * (index % 39 == np.arange(39)[:, None])
+        both = ([self.rates(one, wrench, drag) for one in (state + step, state - step)] for step in steps)
+        found = np.array([(ahead - behind) / 2e-6 for ahead, behind in both]).T
         row = np.repeat(index, 39)
         column = 13 * (row // 13 - 1) + np.tile(np.arange(39), index.size)
         inside = (column >= 0) & (column < index.size)

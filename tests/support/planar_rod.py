@@ -9,6 +9,7 @@ softrobots.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -22,61 +23,93 @@ from tests.support.round_rods import RoundRod
 
 
 @njit(cache=True)
-def _out_of_balance(y, v, force, grid, constants):  # type: ignore[no-untyped-def]
-    """Mass matrix, and generalized forces less those of the acceleration that coordinates with constant rates have; the tip."""
+def _out_of_balance(y, v, force, grid, constants, matrix, forces, tip):  # type: ignore[no-untyped-def]
+    """Mass matrix, and generalized forces less those of the acceleration that coordinates with constant rates have; the tip.
+
+    Loops, no matrix products: numba compiles these in a second, and calls of BLAS take longer than such small products.
+    """
     w, running, bend, stretch, turning, stiffness = grid
     density, inertia, retardation, gravity_x, gravity_z = constants
-    bends, count = bend.shape[1], y.size
-    angle, rate = bend @ y[:bends], bend @ v[:bends]
-    length, lengthening = 1.0 + stretch @ y[bends:], stretch @ v[bends:]
-    sine, cosine = np.sin(angle), np.cos(angle)
-    columns = np.zeros((w.size, 2 * count + 2))  # slopes of x and of z by the coordinates, accelerations at constant rates
+    bends, count, wide = bend.shape[1], y.size, 2 * y.size + 2
+    columns = np.zeros((w.size, wide))  # slopes of x and of z by the coordinates, accelerations at constant rates
+    tip[0] = tip[1] = 0.0
+    for k in range(count):
+        forces[k] = 0.0
+        for j in range(count):
+            forces[k] -= stiffness[k, j] * (y[j] + retardation * v[j])
+            matrix[k, j] = inertia * turning[k, j] if k < bends and j < bends else 0.0
     for i in range(w.size):
+        angle, rate, length, lengthening = 0.0, 0.0, 1.0, 0.0
         for k in range(bends):
-            columns[i, k], columns[i, count + k] = length[i] * cosine[i] * bend[i, k], -length[i] * sine[i] * bend[i, k]
+            angle, rate = angle + bend[i, k] * y[k], rate + bend[i, k] * v[k]
+        for k in range(count - bends):
+            length, lengthening = length + stretch[i, k] * y[bends + k], lengthening + stretch[i, k] * v[bends + k]
+        sine, cosine, centripetal = math.sin(angle), math.cos(angle), length * rate * rate
+        for k in range(bends):
+            columns[i, k], columns[i, count + k] = length * cosine * bend[i, k], -length * sine * bend[i, k]
         for k in range(bends, count):
-            columns[i, k], columns[i, count + k] = sine[i] * stretch[i, k - bends], cosine[i] * stretch[i, k - bends]
-        centripetal = length[i] * rate[i] ** 2
-        columns[i, -2] = 2.0 * lengthening[i] * rate[i] * cosine[i] - centripetal * sine[i]
-        columns[i, -1] = -2.0 * lengthening[i] * rate[i] * sine[i] - centripetal * cosine[i]
-    forces = -(stiffness @ (y + retardation * v))
-    if force[0] != 0.0 or force[1] != 0.0:
-        ends = w @ columns
-        forces += force[0] * ends[:count] + force[1] * ends[count : 2 * count]
-    columns = running @ columns
-    both = np.zeros((2 * w.size, count))  # the slopes of x above those of z, times the root of the mass
-    acceleration = np.zeros(2 * w.size)
-    for i in range(w.size):
-        weight = np.sqrt(density * w[i])
-        acceleration[i] = weight * (gravity_x - columns[i, -2])
-        acceleration[w.size + i] = weight * (gravity_z - columns[i, -1])
+            columns[i, k], columns[i, count + k] = sine * stretch[i, k - bends], cosine * stretch[i, k - bends]
+        columns[i, 2 * count] = 2.0 * lengthening * rate * cosine - centripetal * sine
+        columns[i, 2 * count + 1] = -2.0 * lengthening * rate * sine - centripetal * cosine
+        tip[0] += w[i] * length * sine
+        tip[1] += w[i] * length * cosine
         for k in range(count):
-            both[i, k], both[w.size + i, k] = weight * columns[i, k], weight * columns[i, count + k]
-    forces += acceleration @ both
-    matrix = both.T @ both
-    matrix[:bends, :bends] += inertia * turning
-    return matrix, forces, np.array([np.sum(w * length * sine), np.sum(w * length * cosine)])
+            forces[k] += w[i] * (force[0] * columns[i, k] + force[1] * columns[i, count + k])
+    row = np.zeros(wide)
+    for i in range(w.size):
+        for k in range(wide):
+            row[k] = 0.0
+        for j in range(w.size):
+            for k in range(wide):
+                row[k] += running[i, j] * columns[j, k]
+        mass = density * w[i]
+        for k in range(count):
+            x, z = mass * row[k], mass * row[count + k]
+            forces[k] += x * (gravity_x - row[2 * count]) + z * (gravity_z - row[2 * count + 1])
+            for j in range(count):
+                matrix[k, j] += x * row[j] + z * row[count + j]
 
 
 @njit(cache=True)
-def _runge_kutta(y, v, force, grid, constants, step, steps, stride):  # type: ignore[no-untyped-def]
-    """Path of the tip every `stride` steps, by the classical method of order 4."""
-    tips = np.zeros((steps // stride + 1, 2))
+def _solve(matrix, forces):  # type: ignore[no-untyped-def]
+    """Accelerations in place of the forces, by Cholesky's decomposition in place of the matrix."""
+    for i in range(forces.size):
+        for j in range(i + 1):
+            for k in range(j):
+                matrix[i, j] -= matrix[i, k] * matrix[j, k]
+            matrix[i, j] = math.sqrt(matrix[i, i]) if i == j else matrix[i, j] / matrix[j, j]
+        for k in range(i):
+            forces[i] -= matrix[i, k] * forces[k]
+        forces[i] /= matrix[i, i]
+    for i in range(forces.size - 1, -1, -1):
+        for k in range(i + 1, forces.size):
+            forces[i] -= matrix[k, i] * forces[k]
+        forces[i] /= matrix[i, i]
+
+
+@njit(cache=True)
+def _runge_kutta(start, force, grid, constants, step, steps, stride):  # type: ignore[no-untyped-def]
+    """Path of the tip from rest every `stride` steps, by the classical method of order 4."""
+    count, tips, tip = start.size, np.zeros((steps // stride + 1, 2)), np.zeros(2)
+    matrix, a, at, rate = np.zeros((count, count)), np.zeros(count), np.zeros(count), np.zeros(count)
+    states = np.zeros((4, count))  # coordinates and rates of this row and of the next one
+    for k in range(count):
+        states[0, k] = states[2, k] = start[k]
     for number in range(steps + 1):
-        matrix, forces, tip = _out_of_balance(y, v, force, grid, constants)
-        if number % stride == 0:
-            tips[number // stride] = tip
-        a1 = np.linalg.solve(matrix, forces)
-        matrix, forces, tip = _out_of_balance(y + 0.5 * step * v, v + 0.5 * step * a1, force, grid, constants)
-        a2 = np.linalg.solve(matrix, forces)
-        middle = v + 0.5 * step * a1
-        matrix, forces, tip = _out_of_balance(y + 0.5 * step * middle, v + 0.5 * step * a2, force, grid, constants)
-        a3 = np.linalg.solve(matrix, forces)
-        end = v + 0.5 * step * a2
-        matrix, forces, tip = _out_of_balance(y + step * end, v + step * a3, force, grid, constants)
-        a4 = np.linalg.solve(matrix, forces)
-        y = y + step / 6.0 * (v + 2.0 * middle + 2.0 * end + v + step * a3)
-        v = v + step / 6.0 * (a1 + 2.0 * a2 + 2.0 * a3 + a4)
+        for stage in range(4):
+            part = 0.0 if stage == 0 else step if stage == 3 else 0.5 * step
+            share = step / 6.0 if stage == 0 or stage == 3 else step / 3.0
+            for k in range(count):
+                at[k], rate[k] = states[0, k] + part * rate[k], states[1, k] + part * a[k]
+            _out_of_balance(at, rate, force, grid, constants, matrix, a, tip)
+            _solve(matrix, a)
+            if stage == 0 and number % stride == 0:
+                tips[number // stride, 0], tips[number // stride, 1] = tip[0], tip[1]
+            for k in range(count):
+                states[2, k] += share * rate[k]
+                states[3, k] += share * a[k]
+        for k in range(count):
+            states[0, k], states[1, k] = states[2, k], states[3, k]
     return tips
 
 
@@ -99,7 +132,7 @@ class PlanarRod(RoundRod):
     @cached_property
     def _grid(self) -> tuple[np.ndarray, ...]:
         """Weights and running integral at the Gauss points, values of both sets of polynomials there, stiffness."""
-        count = 2 * self.bends + 16
+        count = self.bends + 10
         points, weights = legendre.leggauss(count)
         s, half = 0.5 * (points + 1.0), 0.5 * self.length
         values = legendre.legvander(points, count - 1)
@@ -117,7 +150,9 @@ class PlanarRod(RoundRod):
         return w, half * integrals @ fit, np.ascontiguousarray(bend), np.ascontiguousarray(stretch), turning, stiffness
 
     def _at(self, y: np.ndarray, v: np.ndarray, force: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        return _out_of_balance(y, v, np.asarray(force, dtype=float), self._grid, self._constants)
+        matrix, forces, tip = np.zeros((y.size, y.size)), np.zeros(y.size), np.zeros(2)
+        _out_of_balance(y, v, np.asarray(force, dtype=float), self._grid, self._constants, matrix, forces, tip)
+        return matrix, forces, tip
 
     @property
     def _constants(self) -> tuple[float, ...]:
@@ -131,7 +166,7 @@ class PlanarRod(RoundRod):
     def frequencies(self) -> np.ndarray:
         """Of small vibrations of the straight weightless rod [rad/s]."""
         rest = np.zeros(self.bends + self.stretches)
-        return np.sqrt(eigh(self._grid[-1], self._at(rest, rest, np.zeros(2))[0], eigvals_only=True))
+        return np.asarray(np.sqrt(eigh(self._grid[-1], self._at(rest, rest, np.zeros(2))[0], eigvals_only=True)))
 
     def equilibrium(self, force: tuple[float, float]) -> np.ndarray:
         """Coordinates at rest under a force on the tip along x and z [N]: SciPy's root from the straight rod, in steps."""
@@ -144,4 +179,5 @@ class PlanarRod(RoundRod):
     def tips(self, start: np.ndarray, duration: float, rows: int, per_row: int) -> np.ndarray:
         """Path of the tip from rest at coordinates `start`, shape (rows + 1, 2) [m], with `per_row` steps between two rows."""
         arguments = np.zeros(2), self._grid, self._constants, duration / (rows * per_row), rows * per_row, per_row
-        return _runge_kutta(start, 0.0 * start, *arguments)
+        path: np.ndarray = _runge_kutta(start, *arguments)
+        return path

@@ -465,27 +465,6 @@ def rod_tip(
     return solution.positions(rod.length)[0], solution.rotations(rod.length)[0]
 
 
-def rod_shape(
-    rod: Rod,
-    tip_wrench: ArrayLike,
-    mid_wrench: ArrayLike | None = None,
-    mid: float = 0.5,
-    gravity_load: ArrayLike | None = None,
-    tol: float = 1e-9,
-    *,
-    s: ArrayLike,
-) -> np.ndarray:
-    """Points of a rod under dead wrenches; other arguments and errors of `solve_rod`.
-
-    Args:
-        s: arc lengths on the unloaded rod, 0 to its length, (n,) [m].
-
-    Returns:
-        Positions, (n, 3) [m].
-    """
-    return solve_rod(rod, tip_wrench, mid_wrench, mid, gravity_load, tol).positions(s)
-
-
 def random_wrenches(
     rng: np.random.Generator, rod: Rod, count: int, bend: float = np.pi / 2, mid: float = 0.5
 ) -> list[tuple[np.ndarray, np.ndarray]]:

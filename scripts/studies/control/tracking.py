@@ -51,8 +51,12 @@ class Followed(NamedTuple):
         }
 
 
-def study() -> list[Followed]:
-    """Follow the path with each controller, and with two of them under a larger load than they assume."""
+def study(rows: slice = slice(None)) -> list[Followed]:
+    """Follow the path with each controller, and with two of them under a larger load than they assume.
+
+    Args:
+        rows: Which of these; all by default.
+    """
     model = sr.load_model(sr.InflatableArm(rotor_inertia=ROTOR))
     path = sr.straight_line(START, END, DURATION, steps=100)
     loaded, rigid = (
@@ -69,7 +73,8 @@ def study() -> list[Followed]:
         ),
     }
     followed = []
-    for name, load in [*((name, 1.0) for name in controllers), *((name, HEAVIER) for name in list(controllers)[2:])]:
+    every = [*((name, 1.0) for name in controllers), *((name, HEAVIER) for name in list(controllers)[2:])]
+    for name, load in every[rows]:
         torque, options = controllers[name]
         moved = sr.simulate(
             model,
