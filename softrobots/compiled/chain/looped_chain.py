@@ -49,11 +49,31 @@ class Kind:
 
 def element_kinds(plan: Plan) -> list[Kind]:
     """Trace the code of every kind of element behind the leading motors."""
-    unknowns = plan.unknowns
+    return [_trace_kind(number, rows, plan) for number, rows in enumerate(rows_of_kinds(plan.unknowns).values())]
+
+
+def rows_of_kinds(unknowns: Unknowns) -> dict[Any, list[int]]:
+    """Return the elements of each kind, by what they share."""
     groups: dict[Any, list[int]] = {}
     for row in range(unknowns.leading_motors, len(unknowns.chain.elements)):
         groups.setdefault(element_signature(unknowns, row), []).append(row)
-    return [_trace_kind(number, rows, plan) for number, rows in enumerate(groups.values())]
+    return groups
+
+
+def kind_element(plan: Plan, number: int, rows: Sequence[int], block: Block) -> tuple[TracedElement, TableColumns]:
+    """Return an element of a kind, with table entries for the numbers in which its elements differ, and the table."""
+    columns = plan.table(block, f"TABLE_{number}", len(rows))
+    return _common([plan.unknowns.traced(row) for row in rows], plan, block, columns), columns
+
+
+def leading_elements(plan: Plan, block: Block) -> list[TracedElement]:
+    """Return the motors before the first unknown, with their positions in the workspace."""
+    elements = []
+    for row, one in enumerate(plan.unknowns.leading(block)):
+        columns = plan.table(block, f"LEADING_{row}", 1, "")
+        mass = columns.entry([one.mass_beyond])
+        elements.append(replace(table_element([one], columns), mass_beyond=mass))
+    return elements
 
 
 def element_signature(unknowns: Unknowns, row: int) -> tuple[Any, ...]:
@@ -78,8 +98,7 @@ def _trace_kind(number: int, rows: list[int], plan: Plan) -> Kind:
     trace = out.trace
     back = Block(f"inward_{infix}{number}", "Inward pass: loads and elimination.", names, trace)
     step_pass = Block(f"step_{infix}{number}", "Steps of its coordinates.", names, trace)
-    columns = TableColumns(out, f"TABLE_{number}", len(rows))
-    element = _common([plan.unknowns.traced(row) for row in rows], plan, out, columns)
+    element, columns = kind_element(plan, number, rows, out)
     axes_loads = out.loads(recursion.axes, 9)
     outward_pass = outward(element, vector(axes_loads).reshape(3, 3))
     out.store_all(recursion.axes, outward_pass.end.ravel().tolist())

@@ -12,6 +12,7 @@ from softrobots.compiled.motion.held_motion import moving_coordinates
 from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
+from softrobots.compiled.run.compiled_code import SharedCode
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks
@@ -39,9 +40,11 @@ class CompiledDynamics(CompiledStatics):
     See `softrobots.compiled.run.compiled_model.CompiledModel`, which adds load estimation and inverse kinematics.
     """
 
-    def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
+    def __init__(
+        self, model: SoftModel, backend: str, locked_strains: tuple[str, ...], shared: SharedCode | None = None
+    ) -> None:
         """Generate and load the code; call `softrobots.compile` instead."""
-        super().__init__(model, backend, locked_strains)
+        super().__init__(model, backend, locked_strains, shared)
         self._motion_runs: dict[tuple[bool, int], Any] = {}
         self._moving = list(moving_coordinates(self._unknowns))
         self._damping = MotionDamping(model, self._unknowns.strains, self._moving)
