@@ -44,6 +44,7 @@ _LOADS = (
     (1e-3, 1.25, "kg or N", "g or mN"),
 )
 """Ratios of numbers of loads in one unit to those in another that it is mistaken for, and how near a ratio is to be."""
+_TOLD = 0.2  # largest standard error of the logarithm of a stiffness that tells a unit
 _FORCES = ("force", "wrench")
 _OFF = math.log(2.0)  # change of a stiffness, as a logarithm, above which loads are doubted
 
@@ -74,7 +75,7 @@ def other_loads(found: Identification, key: str, few: slice, progress: bool | st
         return {name: factor * own for name, own in some.items() if name not in scaled} | scaled
 
     changes = {"changing the sign of gravity": times(-1.0, "gravity"), "changing the sign of forces": times(-1.0, *_FORCES)}
-    for factor, _, wrong, right in _LOADS:
+    for factor, _, wrong, right in _LOADS if rescaled(found) else ():
         changes[f"dividing the loads by {factor:.4g} ({wrong} taken for {right})"] = times(1.0 / factor, *_FORCES, "mass")
     return [
         f"{key}: {words}, and fitting again, leaves residuals of {size:.2g} of the size: a load is what acts on the robot"
@@ -84,7 +85,8 @@ def other_loads(found: Identification, key: str, few: slice, progress: bool | st
 
 def load_units(found: Identification) -> list[str]:
     """The units of loads that all fitted stiffnesses tell, which are as many times what they were taken for."""
-    ratios = _stiffness_ratios(found)
+    known = dict(zip(found.names, found.by_rows.std <= _TOLD, strict=True))
+    ratios = {name: ratio for name, ratio in _stiffness_ratios(found).items() if known[name]}
     loaded = any(np.any(values) for name, values in found.fitted.measurements.loads.items() if name != "gravity")
     for factor, near, given, wanted in _LOADS if ratios and loaded else ():
         if max(abs(math.log(ratio / factor)) for ratio in ratios.values()) < math.log(near):
