@@ -18,7 +18,7 @@ from __future__ import annotations
 
 from softrobots.compiled.chain.elements import constants, vector
 from softrobots.compiled.chain.layout import TipLayout
-from softrobots.compiled.chain.looped_chain import leading_elements
+from softrobots.compiled.chain.looped_elements import leading_elements
 from softrobots.compiled.chain.looped_tip import leading_motors
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unrolled_chain import seen_backwards

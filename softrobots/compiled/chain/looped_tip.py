@@ -17,7 +17,7 @@ from __future__ import annotations
 from softrobots.compiled.chain.elements import Load, Motion, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import RecursionLayout, TipLayout
-from softrobots.compiled.chain.looped_chain import leading_elements
+from softrobots.compiled.chain.looped_elements import leading_elements
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, inward
 from softrobots.compiled.chain.unrolled_chain import seen_backwards

@@ -6,7 +6,7 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Load, Vector, constants, vector
 from softrobots.compiled.chain.layout import Layout
-from softrobots.compiled.chain.looped_chain import leading_elements
+from softrobots.compiled.chain.looped_elements import leading_elements
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance
 from softrobots.compiled.chain.unrolled_chain import place_base

@@ -7,7 +7,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.compiled.chain.constrained_segments import sum_numbers
-from softrobots.compiled.chain.looped_chain import kind_element, leading_elements, rows_of_kinds
+from softrobots.compiled.chain.looped_elements import kind_element, leading_elements, rows_of_kinds
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.looped_frame import tip_from_end

@@ -9,7 +9,6 @@ import numpy as np
 
 from softrobots.compiled.run.backends import BACKENDS, available_backend
 from softrobots.compiled.run.batches import batch_rows, fail, flat_targets, gravity_vector, unusable, without
-from softrobots.compiled.run.compiled_code import SharedCode
 from softrobots.compiled.run.compiled_dynamics import CompiledDynamics
 from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE
 from softrobots.compiled.run.friction_states import StatesBefore
@@ -67,11 +66,9 @@ class CompiledModel(CompiledDynamics):
     friction from the state before. Safe to share between threads.
     """
 
-    def __init__(
-        self, model: SoftModel, backend: str, locked_strains: tuple[str, ...], shared: SharedCode | None = None
-    ) -> None:
-        """Generate and load the code; call `softrobots.compile` instead."""
-        super().__init__(model, backend, locked_strains, shared)
+    def __init__(self, *given: Any) -> None:
+        """Generate and load the code, see `CompiledStatics`; call `softrobots.compile` instead."""
+        super().__init__(*given)
         self._estimate, self._torques = self._run(False).estimate, self._layout.torques
         self._plain_estimate = self._plain and self._unknowns.moved_by_motors
 
