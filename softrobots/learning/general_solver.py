@@ -1,7 +1,7 @@
 r"""Equilibria and load estimates of every robot without dry friction, with the derivatives of those of `sensitivity`.
 
 The counterpart of `number_changes` and compiled code, with the same calls: each row is found as by `solve_equilibrium` or
-`estimate_load`, from rest; those of the robot that code was compiled of by its batch solvers. Derivatives are the closed forms
+`estimate_load`, from rest; those of a compiled chain by its batch solvers (`varied_chains`). Derivatives are the closed forms
 of `softrobots.identification.residual_derivatives` and `residual_rates` for many rows at once, one right-hand side a case in
 either mode, whatever the number of parameters and results. The numbers of the robot are here its parameters themselves.
 
