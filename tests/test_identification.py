@@ -394,6 +394,44 @@ def test_intervals_cover_as_often_as_they_say() -> None:
         assert row["rows"] < 0.9 < 0.93 <= row["blocks"] <= 0.97, row
 
 
+def test_a_combination_that_has_moved_is_not_said_to_have_kept_its_start() -> None:
+    """Under forces of the wrong sign the stiffness grows until they have no effect."""
+    random, arm = np.random.default_rng(4), sr.load_model(sr.InflatableArm(stiffness=190.0))
+    motors, forces = random.uniform(-0.6, 0.6, (15, 3)), random.normal(size=(15, 3))
+    tips = [sr.solve_equilibrium(arm, q, force).tip_position for q, force in zip(motors, forces, strict=True)]
+    found = sr.identify(
+        sr.InflatableArm(stiffness=170.0), sr.Measurements(motors, force=-forces, tip_position=tips), "stiffness"
+    )
+    assert found.values["stiffness"] > 1700.0
+    assert found.unidentifiable
+    assert found.held == 0
+    assert "kept their start" not in found.summary()
+
+
+def test_errors_of_positions_with_missing_cells_are_those_of_what_is_there(noisy: sr.Measurements) -> None:
+    """Cells that are missing at random leave the error as it is, within chance; a column that is missing adds nothing."""
+    found = sr.identify(ARM, noisy, "stiffness")
+    left = found.residuals["positions.tip"]
+    whole = float(np.sqrt(np.mean(np.sum(left**2, axis=1))))
+    assert found.fitted.errors["positions.tip"][0] == pytest.approx(whole, rel=1e-12)
+    random, few = np.random.default_rng(1), []
+    for _ in range(400):
+        gaps = np.where(random.uniform(size=left.shape) < 0.4, np.nan, left)
+        few.append(found.fitted._replace(residuals={"positions.tip": gaps}).errors["positions.tip"][0] ** 2)
+    assert np.mean(few) == pytest.approx(whole**2, rel=4.0 * np.std(few) / np.mean(few) / 20.0)
+    gaps = left * [1.0, np.nan, 1.0]
+    only = found.fitted._replace(residuals={"positions.tip": gaps}).errors["positions.tip"][0]
+    assert only == pytest.approx(float(np.sqrt(np.mean(np.sum(left[:, [0, 2]] ** 2, axis=1)))), rel=1e-12)
+
+
+def test_no_loss_warns_of_numbers_too_large_to_square_or_infinite() -> None:
+    """pytest turns warnings into errors."""
+    for loss in ("linear", "soft_l1", "huber", "cauchy", "arctan"):
+        values = rho(loss, np.array([0.0, 1.0, 1e100, 1e200, np.inf]))
+        assert not np.isnan(values).any()
+        assert np.all(np.diff(values[0]) >= 0.0)
+
+
 def test_one_row_tells_three_combinations_and_the_rest_keeps_its_start() -> None:
     data = sr.Measurements([[0.3, 0.4, -0.5]], force=[[1.0, 8.0, -9.0]], tip_position=[[0.9, 0.35, 0.02]])
     names = ("link[*].stiffness", "base.position", "motor[2].offset")

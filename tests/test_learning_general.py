@@ -43,7 +43,7 @@ def test_derivatives_are_differences_of_solved_robots(kind: str) -> None:
 
 @pytest.mark.study
 def test_equilibria_of_a_compiled_robot_are_those_of_its_batch_solver() -> None:
-    """At the values that it was compiled with; others have no code. Derivatives are the same."""
+    """At the values that it was compiled with, and close to the others' at other values. Derivatives are the same."""
     case = CASES["tendons"]()
     compiled = sr.compile(sr.load_model(case.robot), backend="python")
     solver, plain = (Differentiable("equilibrium", one, case.names, **OPTIONS) for one in (compiled, case.robot))
@@ -63,7 +63,7 @@ def test_equilibria_of_a_compiled_robot_are_those_of_its_batch_solver() -> None:
         assert own == pytest.approx(other, rel=1e-7, abs=1e-9 * np.abs(other).max())
     inputs[2] = 1.01 * solver.present
     for own, other in zip(solver.solve(*inputs), plain.solve(*inputs), strict=True):
-        assert np.array_equal(own, other)
+        assert own == pytest.approx(other, abs=1e-9 * solver.model.reach)
 
 
 def test_load_estimates_of_an_arm_with_a_plateau() -> None:

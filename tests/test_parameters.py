@@ -13,6 +13,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.identification.parameter_names import Registry
 from softrobots.identification.parameters import ParameterSet
 from tests.support.laws import law
 
@@ -198,3 +199,13 @@ def test_a_value_out_of_bounds_is_refused_by_the_robot() -> None:
     for value in (-0.1, 0.61):
         with pytest.raises(sr.ParameterError, match="hinge_offset"):
             found.model([value])
+
+
+@pytest.mark.parametrize("robot", [sr.InflatableArm(), PCC, TUBE])
+def test_every_name_that_is_listed_is_accepted(robot: Any) -> None:
+    """Also of fields whose numbers in force are told by others, and of robots without actuators."""
+    model = sr.load_model(robot)
+    names = Registry(robot, model, {}).names()
+    assert len(names) > 10
+    for name in names:
+        assert ParameterSet.of(model, name).names

@@ -167,6 +167,58 @@ def seen_from_anywhere(seed: int, rows: int, noise: float, stiffness: float = 18
     return sr.Measurements(motors, force=forces, gravity=gravity, tip_position=seen)
 
 
+@pytest.fixture(scope="module")
+def weighed() -> sr.Measurements:
+    """Tips of a stiffer arm under masses, with noise of 0.2 mm."""
+    random, arm = np.random.default_rng(4), sr.load_model(sr.InflatableArm(stiffness=190.0))
+    motors, masses = random.uniform(-0.6, 0.6, (15, 3)), random.uniform(0.0, 0.5, 15)
+    tips = [
+        sr.solve_equilibrium(arm, q, (0, 0, -9.80665 * mass), gravity=sr.EARTH_GRAVITY).tip_position
+        for q, mass in zip(motors, masses, strict=True)
+    ]
+    seen = np.array(tips) + 2e-4 * random.standard_normal((15, 3))
+    return sr.Measurements(motors, mass=masses, gravity=sr.EARTH_GRAVITY, tip_position=seen)
+
+
+@pytest.mark.study
+def test_the_unit_of_loads_beside_the_weight_of_the_robot_is_told_by_another_fit(weighed: sr.Measurements) -> None:
+    robot, given = sr.InflatableArm(stiffness=170.0), weighed.arguments()
+    for factor, words in ((1e3, r"dividing the loads by 1000 \(g or mN taken for kg or N\), and fitting again"), (1.0, "")):
+        fit = sr.identify(robot, sr.Measurements(**given | {"mass": factor * weighed.loads["mass"]}), "stiffness")
+        told = hints(fit)
+        assert (any(re.search(words, text) for text in told)) if words else told == []
+
+
+def test_the_unit_of_loads_that_a_stiffness_absorbs_is_told_by_its_ratio() -> None:
+    """Of a robot without weight the stiffness absorbs all of it."""
+    random, robot = np.random.default_rng(1), sr.InflatableArm(stiffness=180.0)
+    arm, forces = sr.load_model(sr.InflatableArm(stiffness=190.0)), random.normal(size=(8, 3))
+    tips = [sr.solve_equilibrium(arm, q, force).tip_position for q, force in zip(MOTORS, forces, strict=False)]
+    for factor, words in ((1e3, "about 1000, the ratio of g or mN"), (9.80665, "about 9.807, the ratio of N to kg"), (1.0, "")):
+        rows = sr.Measurements(MOTORS[:8], force=factor * forces, tip_position=np.array(tips))
+        told = hints(sr.identify(robot, rows, "stiffness"))
+        assert ([words in text for text in told] == [True]) if words else told == []
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("loads", ["gravity", "force"])
+def test_loads_of_wrong_sign_that_a_stiffness_absorbs_are_told(weighed: sr.Measurements, loads: str) -> None:
+    """The stiffness grows until the wrong load has no effect; what is left is a small part of the motion by the motors."""
+    given = weighed.arguments()
+    weights = given.pop("mass")[:, None] * np.array(sr.EARTH_GRAVITY)
+    given |= {"force": weights} | ({"gravity": None} if loads == "force" else {})
+    if loads == "force":
+        arm = sr.load_model(sr.InflatableArm(stiffness=190.0))
+        pairs = zip(given["q_motors"], weights, strict=True)
+        given["positions"] = {"tip": np.array([sr.solve_equilibrium(arm, q, force).tip_position for q, force in pairs])}
+    robot = sr.InflatableArm(stiffness=170.0)
+    wrong = given | {loads: -given[loads]} | ({"force": None} if loads == "gravity" else {})
+    right = given | ({"force": None} if loads == "gravity" else {})
+    words = "changing the sign of gravity" if loads == "gravity" else "changing the sign of forces"
+    assert any(words in text for text in hints(sr.identify(robot, sr.Measurements(**wrong), "stiffness")))
+    assert not any("changing" in text for text in hints(sr.identify(robot, sr.Measurements(**right), "stiffness")))
+
+
 @pytest.mark.study
 @pytest.mark.parametrize(("axes", "words"), [([1, 0, 2], "y, x, z"), ([0, 2, 1], "x, z, y")])
 def test_swapped_axes_that_a_fitted_base_hides_are_told(axes: list[int], words: str) -> None:
@@ -210,5 +262,5 @@ def test_a_noisy_fit_is_not_called_mirrored(cases: int) -> None:
         fit = sr.identify(robot, rows, FITTED)
         left, tips = fit.residuals["positions.tip"], rows.measured["positions.tip"]
         tried += bool(np.sum(left**2) > 0.02 * np.sum((tips - tips.mean(axis=0)) ** 2))
-        assert not [text for text in hints(fit) if "fitting again" in text], seed
+        assert not [text for text in hints(fit) if "fitting again" in text or "taken for" in text], seed
     assert tried > 0.3 * cases  # fits so bad that axes are suspected

@@ -13,6 +13,7 @@ from scipy import stats
 import softrobots as sr
 from softrobots.identification.gauges import find_gauges
 from softrobots.identification.uncertainty import (
+    Uncertainty,
     outliers,
     standardised_residuals,
     uncertainty_from_blocks,
@@ -53,6 +54,14 @@ def test_intervals_with_known_errors_are_normal_and_logarithmic_ones_are_ratios(
     assert found.intervals([5.0, 5.0], [False, True]) == pytest.approx(
         np.array([[5.0 + low / 10.0, 5.0 + high / 10.0], [5.0 * np.exp(low / 4.0), 5.0 * np.exp(high / 4.0)]]), rel=1e-12
     )
+
+
+def test_an_interval_with_hardly_a_degree_of_freedom_is_open_without_a_warning() -> None:
+    """Student's t of 1e-5 degrees is beyond all numbers; pytest turns warnings into errors."""
+    ends = Uncertainty(np.diag([0.2, 0.04, 0.0]), 1e-5, np.ones(3, dtype=bool)).intervals([1.0, 2.0, 3.0], [True, False, False])
+    assert ends[0].tolist() == [0.0, np.inf]
+    assert -ends[1, 0] == ends[1, 1] > 1e20
+    assert ends[2].tolist() == [3.0, 3.0]
 
 
 @given(seeds_)

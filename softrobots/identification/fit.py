@@ -30,23 +30,24 @@ _SAME = 1e-8  # share of the cost that a further step may gain at the end: 0.005
 _SAME_RUBBING = 1e-5  # the same of a robot with dry friction: where rows begin to slip, the cost has kinks
 _ROUNDING = 1e-22  # share of the first cost that is rounding
 _WITHOUT_NOISE = 1e-12  # share of the first cost below which the rows have no noise: then all digits are looked for
+_KEPT = 1e-6  # change along a combination, of logarithms or in units, that is none
 _PATIENCE = 30  # steps of a search before full steps are tried
 _LEAPS = 6  # full steps in a row
 
 
 def rho(loss: str, z: FloatArray) -> FloatArray:
     """Return a loss of squared residuals, one of SciPy's `least_squares`, and its two derivatives, shape (3, rows)."""
-    one = np.ones_like(z)
+    one, none, near = np.ones_like(z), np.zeros_like(z), np.minimum(z, 1e60)  # whose powers do not overflow
     if loss == "soft_l1":
         return np.array([2.0 * (np.sqrt(1.0 + z) - 1.0), (1.0 + z) ** -0.5, -0.5 * (1.0 + z) ** -1.5])
     if loss == "huber":
         far = np.maximum(z, 1.0)
-        return np.where(z <= 1.0, [z, one, 0.0 * z], [2.0 * far**0.5 - 1.0, far**-0.5, -0.5 * far**-1.5])
+        return np.where(z <= 1.0, [z, one, none], [2.0 * far**0.5 - 1.0, far**-0.5, -0.5 * far**-1.5])
     if loss == "cauchy":
-        return np.array([np.log1p(z), 1.0 / (1.0 + z), -1.0 / (1.0 + z) ** 2])
+        return np.array([np.log1p(z), 1.0 / (1.0 + near), -1.0 / (1.0 + near) ** 2])
     if loss == "arctan":
-        return np.array([np.arctan(z), 1.0 / (1.0 + z**2), -2.0 * z / (1.0 + z**2) ** 2])
-    return np.array([z, one, 0.0 * z])
+        return np.array([np.arctan(z), 1.0 / (1.0 + near**2), -2.0 * near / (1.0 + near**2) ** 2])
+    return np.array([z, one, none])
 
 
 class Fit:
@@ -164,8 +165,14 @@ class Fit:
 
     @property
     def held(self) -> int:
-        """Number of combinations of parameters that kept their start."""
-        return len(self._held) + len(self._weak)
+        """Number of combinations that change no prediction, or that noise hides, which kept the robot's values.
+
+        Others have moved: where a search gained by running off, or began elsewhere (a mounted base, another start).
+        """
+        moved = self._coordinates(self.values) - self._coordinates(self.predictor.parameters.values)
+        rows = np.concatenate([self._held, self._weak])
+        change = np.abs(rows @ moved) / np.maximum(np.linalg.norm(rows, axis=1), 1e-300)
+        return int(np.count_nonzero(change <= _KEPT))
 
     @property
     def information(self) -> FloatArray:
@@ -207,7 +214,7 @@ class Fit:
             return np.full(self._count, np.inf)
         data = self.weights.flat(prediction.differences())
         known = (self.prior.mean - prediction.values[self.prior.places]) / self.prior.std
-        self._count, self._linear = len(data) + len(known) + self.held, len(data)
+        self._count, self._linear = len(data) + len(known) + len(self._held) + len(self._weak), len(data)
         return np.concatenate([data, known, self._held @ (x - self._anchor), self._weak @ (x - self._weak_anchor)])
 
     def _jacobian(self, x: FloatArray) -> FloatArray:

@@ -42,7 +42,10 @@ class Comparison(NamedTuple):
 
     @property
     def errors(self) -> dict[str, tuple[float, str]]:
-        """Root mean square of the residuals by quantity, of positions of their length, and unit."""
+        """Root mean square of the residuals by quantity, of positions of their length, and unit.
+
+        Of a length it is the root of the sum of the mean squares of its components, each over the cells that are there.
+        """
         found = {}
         for key, values in self.residuals.items():
             kind, _, name = key.partition(".")
@@ -50,9 +53,9 @@ class Comparison(NamedTuple):
             if kind == "poses":
                 parts = {f"position of {name}": (values[:, :3], "m"), f"rotation of {name}": (values[:, 3:], "rad")}
             for label, (numbers, unit) in parts.items():
-                squares = np.nansum(numbers**2, axis=1) if kind in ("positions", "poses") else numbers.ravel() ** 2
-                there = np.isfinite(numbers).any(axis=1) if kind in ("positions", "poses") else np.isfinite(numbers.ravel())
-                found[label] = (float(np.sqrt(np.mean(squares[there]))) if there.any() else 0.0, unit)
+                components = numbers.T if kind in ("positions", "poses") else numbers.reshape(1, -1)
+                there = [one[np.isfinite(one)] for one in components]
+                found[label] = (float(np.sqrt(sum(np.mean(one**2) for one in there if one.size))), unit)
         return found
 
 
@@ -94,7 +97,7 @@ class Identification(Summarised):
     unidentifiable: tuple[str, ...]
     """What the measurements cannot tell apart, in words."""
     held: int
-    """Number of combinations of parameters without any effect, which kept the values they started with."""
+    """Number of combinations of parameters without any effect, or that noise hides, which kept the values they started with."""
     history: History
     """Cost and values at every step."""
     priors: Mapping[str, tuple[float, float]]
@@ -179,7 +182,7 @@ class Identification(Summarised):
             where = self.fitted.measurements.where
             lines.append(f"outliers ({len(self.outliers)} rows): {', '.join(map(where, self.outliers[:10]))}")
         if self.held:
-            lines.append(f"combinations without effect, which kept their start: {self.held}")
+            lines.append(f"combinations that the measurements do not tell, which kept their start: {self.held}")
         lines += [f"not told apart: {text}" for text in self.unidentifiable]
         return [*parts, "\n".join(lines)]
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import FloatArray, by_column, finite_array, instance_of, stacked_columns
+from softrobots.core.checks import LARGEST, FloatArray, by_column, finite_array, instance_of, stacked_columns
 from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
@@ -159,7 +159,7 @@ def deviations_of(measured: Mapping[str, FloatArray], std: Any, where: Callable[
         if each.ndim > 2 or any(own not in (1, n) for own, n in zip(each.shape[::-1], missing.shape[::-1], strict=False)):
             raise ParameterError(field, given, f"one number, one for each component, or of shape {missing.shape}")
         found[key] = np.where(missing, 1.0, each)
-        _refuse(field, found[key], ~(found[key] > 0.0), "positive", where)
+        _refuse(field, found[key], ~(found[key] >= 1.0 / LARGEST), f"positive, at least {1.0 / LARGEST:g}", where)
     return found
 
 

@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import math
 import re
+import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Literal, NamedTuple
@@ -101,15 +103,28 @@ class Registry:
         """Return the names that there are, those of parts as `link[*].stiffness`; loads, for derivatives only, last."""
         names: list[str] = []
         for name in self._facts:
-            value = getattr(self._robot, name)
-            if _numeric(value) or (value is None and self._facts[name].in_force):
-                names.append(name)
+            if self._accepted(name):
+                with contextlib.suppress(ParameterError):  # of some fields a single number gives no entries
+                    self._tied(name)
+                    names.append(name)
                 if isinstance(self._values(name), tuple):
                     names += [f"{word}[*].{name}" for word in self._words(name)] or [f"{name}[*]"]
         for joint in self._model.structure.spring_joints:
             names += [f"joint[{joint}].stiffness", f"joint[{joint}].rest"]
         names += ["base.position", "base.rotation", *(f"marker.{marker}.offset" for marker in self._markers)]
-        return names + ["motor[*].offset"] * (self._model.n_motors > 0) + ["motor[*]", *LOADS]
+        return names + ["motor[*].offset", "motor[*]"] * (self._model.n_motors > 0) + list(LOADS)
+
+    def _accepted(self, field: str) -> bool:
+        """Whether a field has numbers, and the robot takes them: those in force where it has none may be told by others."""
+        try:
+            values = self._values(field)
+            if getattr(self._robot, field) is None:
+                with warnings.catch_warnings():
+                    warnings.simplefilter("ignore")  # told when the robot was made
+                    dataclasses.replace(self._robot, **{field: values})
+        except ParameterError:
+            return False
+        return True
 
     def _words(self, field: str) -> Iterator[str]:
         """What the parts of a field are called: those of the robot, and its actuators."""

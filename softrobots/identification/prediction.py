@@ -5,7 +5,7 @@ a load or gravity `f` told there is `R^T f` to the robot. A marker at `o` in its
 was commanded plus an offset. Each search for an equilibrium starts from that of the values before.
 
 A robot with dry friction remembers: each row comes from the row before, the first from rest, and derivatives go through all
-that it remembers. They are in closed form, too (`softrobots.identification.friction_derivatives`), but with friction of guides
+that it remembers. They are in closed form, too (`derivatives.friction_derivatives`), but with friction of guides
 or given lengths, where they are differences of the whole course.
 """
 
@@ -21,9 +21,9 @@ import pinocchio as pin
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.core.vectors import cross
+from softrobots.identification.derivatives.friction_derivatives import friction_loads, slopes_of_course
 from softrobots.identification.derivatives.row_vibration import VIBRATION, RowVibration
 from softrobots.identification.derivatives.rows_and_states import Outputs, States
-from softrobots.identification.friction_derivatives import friction_loads, slopes_of_course
 from softrobots.identification.measured_robot import frame_of, load_cases, loads_on
 from softrobots.identification.measurement_checks import difference
 from softrobots.identification.measurements import Measurements

@@ -15,8 +15,8 @@ from softrobots.core.summary import Part, Summarised, Table, short
 from softrobots.dynamics.vibration import VibrationModes
 from softrobots.identification.derivatives.contact_derivatives import ContactDerivatives
 from softrobots.identification.derivatives.frequency_derivatives import frequency_slopes
+from softrobots.identification.derivatives.friction_derivatives import friction_loads
 from softrobots.identification.derivatives.rows_and_states import Outputs, States
-from softrobots.identification.friction_derivatives import friction_loads
 from softrobots.identification.model_change import present_change
 from softrobots.identification.parameter_names import LOADS
 from softrobots.identification.parameters import ParameterSet

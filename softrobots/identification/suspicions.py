@@ -2,13 +2,12 @@
 
 Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them. But
 where the rotation of the base is fitted, it hides most of a swapped axis, and other parameters hide reversed commands. Then
-slopes by commands are compared with those of the robot as it was given, and the whole fit is done again to the numbers with two
-axes swapped, or one mirrored, and told by a chi-square test.
+slopes by commands are compared with those of the robot as it was given, and the whole fit is done again to other numbers, see
+`softrobots.identification.refits`.
 """
 
 from __future__ import annotations
 
-import contextlib
 import itertools
 import math
 from collections.abc import Sequence
@@ -18,13 +17,12 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import SoftRobotsError
-from softrobots.core.progress import with_progress
 from softrobots.identification.identification import Identification
 from softrobots.identification.identify import identify
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
+from softrobots.identification.refits import STEPS, load_units, other_axes, other_loads, rescaled
 from softrobots.model.soft_model import SoftModel, check_model
 
 FACTORS = (
@@ -44,17 +42,6 @@ FAR_LESS = 0.25
 """What a remedy must leave of it to be told: residuals of at most half the size."""
 
 _FEWEST = 4  # rows
-_STEPS = 20  # of such a fit
-_SIGNIFICANT = 30.0  # gain of a fit to mirrored numbers in variances: 5 standard deviations and what six trials add
-_MIRRORED = {
-    "y, x, z": ((0, 1, 0), (1, 0, 0), (0, 0, 1)),
-    "z, y, x": ((0, 0, 1), (0, 1, 0), (1, 0, 0)),
-    "x, z, y": ((1, 0, 0), (0, 0, 1), (0, 1, 0)),
-    "-x, y, z": ((-1, 0, 0), (0, 1, 0), (0, 0, 1)),
-    "x, -y, z": ((1, 0, 0), (0, -1, 0), (0, 0, 1)),
-    "x, y, -z": ((1, 0, 0), (0, 1, 0), (0, 0, -1)),
-}
-"""Orders of axes that no turn makes; each is its own inverse."""
 _MOST_SOLVED = 50  # rows in which other frames are tried
 _MOST_REVERSED = 12  # actuators of which any may be reversed: so many bits are tried
 _SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; other parameters are not right yet either
@@ -72,7 +59,7 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
         progress: Whether to show a bar where fits are tried, or its label.
     """
     rows = found.fitted.measurements
-    texts: list[str] = []
+    texts = load_units(found)
     few = slice(None, None, -(-len(rows) // _MOST_SOLVED))
     for key, values in found.fitted.predicted.items():
         measured, predicted, before = _points(rows.measured[key]), _points(values), len(texts)
@@ -80,7 +67,10 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
         if key.startswith(("positions.", "poses.")) and _unexplained(measured, predicted) > UNEXPLAINED:
             texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
             texts += _reversed_actuators(found, key, few) if len(texts) == before else []
-            texts += _other_axes(found, key, few, progress) if len(texts) == before else []
+            texts += other_axes(found, key, few, progress) if len(texts) == before else []
+        doubted = _unexplained(measured, predicted) > UNEXPLAINED or rescaled(found)
+        if key.startswith(("positions.", "poses.")) and doubted and not texts:
+            texts += other_loads(found, key, few, progress)
         if len(texts) == before and (share := _unexplained(measured, predicted)) > _MUCH:
             texts.append(
                 f"{key}: {100.0 * share:.2g} % of the variance are left unexplained: are order and signs of the actuators "
@@ -200,7 +190,7 @@ def _reversed_actuators(found: Identification, key: str, few: slice) -> list[str
     rows, base = found.fitted.measurements[few], [name for name in found.names if name.startswith("base.")]
     if not base:
         return []
-    fit = identify(found.model, rows, ParameterSet.of(found.model, base, rows.markers), max_iterations=_STEPS)
+    fit = identify(found.model, rows, ParameterSet.of(found.model, base, rows.markers), max_iterations=STEPS)
     measured, predicted = _points(rows.measured[key]), _points(fit.fitted.predicted[key])
     known = _known(measured, predicted)
     q, n = _centred(rows.q_motors[known]), rows.q_motors.shape[1]
@@ -219,34 +209,6 @@ def _reversed_actuators(found: Identification, key: str, few: slice) -> list[str
         return []
     order = ", ".join(str(int(number * sign)) for number, sign in enumerate(signs[best], start=1))
     return [f"{key}: taking the actuators as {order} {_words(shares[best], shares[0])} that follows them"]
-
-
-def _other_axes(found: Identification, key: str, few: slice, progress: bool | str) -> list[str]:
-    """The swap of two axes, or the mirrored axis, of positions with which a fit with a free base leaves far less, if any does.
-
-    With the sum of squares `S` of `n` numbers and `P` parameters, :math:`(n - P) (S - S') / S'` is the gain in variances.
-    """
-    if not key.startswith("positions.") or not any(name.startswith("base.rotation") for name in found.names):
-        return []
-    rows = found.fitted.measurements[few]
-    own = float(np.nansum(found.residuals[key][few] ** 2))
-    freedoms = np.count_nonzero(np.isfinite(found.residuals[key][few])) - len(found.names)
-    left, names = dict[str, float](), ParameterSet.of(found.model, found.names, rows.markers)
-    options: dict[str, Any] = {"priors": found.priors, "loss": found.loss, "max_iterations": _STEPS}
-    tried = with_progress(_MIRRORED.items(), progress, label=f"axes of {key}", unit="fit")
-    for words, change in tried:
-        given = rows.arguments()
-        given["positions"] |= {key.partition(".")[2]: rows.measured[key] @ np.array(change)}
-        with contextlib.suppress(SoftRobotsError):
-            fit = identify(found.model, Measurements(**given), names, **options)
-            left[words] = float(np.nansum(fit.residuals[key] ** 2))
-    words = min(left, key=left.__getitem__, default="")
-    if not left or not own > 2.0 * left[words] or not freedoms * (own - left[words]) > _SIGNIFICANT * left[words]:
-        return []
-    return [
-        f"{key}: taking its x, y, z for {words}, and fitting again, leaves residuals of {math.sqrt(left[words] / own):.2g} of "
-        "the size: are two axes swapped, or is one mirrored?"
-    ]
 
 
 def _points(values: FloatArray) -> FloatArray:

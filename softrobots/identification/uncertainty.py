@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softrobots.core.checks import FloatArray, finite_array, non_negative_array
+from softrobots.core.checks import LARGEST, FloatArray, finite_array, non_negative_array
 from softrobots.core.errors import ParameterError
 
 CONFIDENCE = 0.95
@@ -66,12 +66,14 @@ class Uncertainty:
         """
         from scipy.special import stdtrit  # here, because importing it takes longer than all of this package
 
-        margin = stdtrit(self.freedoms, 0.5 + 0.5 * confidence) * self.std[:, None] * np.array([-1.0, 1.0])
+        quantile = min(float(stdtrit(self.freedoms, 0.5 + 0.5 * confidence)), LARGEST)  # finite: no margin of zero is NaN
+        margin = quantile * self.std[:, None] * np.array([-1.0, 1.0])
         middle, ratio = np.asarray(values, dtype=np.float64)[:, None], np.reshape(logarithmic, (-1, 1))
         by_logarithm = ratio & (self.std[:, None] <= _LARGEST_STD)
         ends = middle + np.where(ratio & (middle != 0.0), np.abs(middle), 1.0) * margin
         ends = np.where(ratio, np.maximum(ends, 0.0), ends)
-        return np.asarray(np.where(by_logarithm, middle * np.exp(np.where(by_logarithm, margin, 0.0)), ends))
+        with np.errstate(over="ignore"):  # with hardly a degree of freedom the upper end is infinite
+            return np.asarray(np.where(by_logarithm, middle * np.exp(np.where(by_logarithm, margin, 0.0)), ends))
 
 
 def uncertainty_from_rows(jacobian: Any, residuals: Any, *, prior: Any = 0.0, std_known: bool = True) -> Uncertainty:

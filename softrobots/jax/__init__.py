@@ -33,8 +33,8 @@ def equilibrium(
         backend: "numba" or "python", as for `softrobots.compile`: short chains of joints, inflatable arms among them, in
             microseconds a case; or "pinocchio": every robot without dry friction, solved from rest as by `solve_equilibrium`,
             in tenths of a millisecond to milliseconds. By default compiled code where it has derivatives. Of what
-            `softrobots.compile` returns, results at the values that it was compiled with come from its batch solver, and their
-            derivatives are compiled, too.
+            `softrobots.compile` returns, results come from its batch solver, at other values of the parameters by a second code
+            that is made when they are first asked for, and derivatives are compiled, too.
         threads: Number of threads of compiled code.
         failed: What becomes of rows without a stable equilibrium: "raise" raises an error that names them (JAX wraps it
             in one of its own under its transformations), "nan" makes their results NaN and their gradients zero.

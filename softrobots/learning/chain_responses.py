@@ -10,9 +10,6 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.compiled.program.given_program import make_given_program
-from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import solve_batch
 from softrobots.compiled.run.compiled_model import CompiledModel
 from softrobots.compiled.settings import CHUNK
@@ -77,8 +74,7 @@ class ChainResponses:
         """Generate and load the code."""
         self._model, self._unknowns, self._weight = compiled.model, compiled.unknowns, weight
         self._chain, self._strains = self._unknowns.chain, list(self._unknowns.strains)
-        self._actuation = Actuation(self._model, self._unknowns)
-        self._run: Any = make_run(make_given_program(self._unknowns, weight=weight), compiled.backend)
+        self._actuation, self._run = compiled.actuation, compiled.given_run(weight)
         self._slope = np.eye(self._unknowns.n_constraints) if self._unknowns.held_lengths else self._chain.constrained_slope
 
     def at(self, motors: FloatArray, force: FloatArray, elastic: FloatArray, gravity: FloatArray | None) -> ChainEquilibria:

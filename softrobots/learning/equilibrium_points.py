@@ -204,6 +204,7 @@ class ChainPoints(EquilibriumPoints):
     def loads(self, weights: FloatArray, *, parameters: bool = True) -> Slopes:
         """Differentiate weighted loads on the actuators."""
         pulled = [self._chain.pull_loads(self._solved, one, self._threads) for one in np.swapaxes(weights, 0, 1)]
+        vars(self).setdefault("_tensions", pulled[0].tensions)
         return self._slopes(pulled, Outputs(loads=weights), parameters=parameters)
 
     def _slopes(self, pulled: Sequence[Pulled], outputs: Outputs, *, parameters: bool = True) -> Slopes:

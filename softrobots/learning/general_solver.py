@@ -1,7 +1,7 @@
 r"""Equilibria and load estimates of every robot without dry friction, with the derivatives of those of `sensitivity`.
 
 The counterpart of `number_changes` and compiled code, with the same calls: each row is found as by `solve_equilibrium` or
-`estimate_load`, from rest; those of the robot that code was compiled of by its batch solvers. Derivatives are the closed forms
+`estimate_load`, from rest; those of a compiled chain by its batch solvers (`varied_chains`). Derivatives are the closed forms
 of `softrobots.identification.residual_derivatives` and `residual_rates` for many rows at once, one right-hand side a case in
 either mode, whatever the number of parameters and results. The numbers of the robot are here its parameters themselves.
 
@@ -11,7 +11,7 @@ Given lengths leave combinations `y = E z` of the strains `z` free; `E` changes 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property, lru_cache
+from functools import lru_cache
 
 import numpy as np
 
@@ -25,6 +25,7 @@ from softrobots.learning.chain_responses import ChainResponses
 from softrobots.learning.equilibrium_points import ChainPoints, ChangingRobot, EquilibriumPoints, PinocchioPoints
 from softrobots.learning.force_condition import ForceCondition
 from softrobots.learning.row_solver import RowSolver
+from softrobots.learning.varied_chains import VariedChains
 from softrobots.model.soft_model import SoftModel
 
 _SIZE = 1 << 20  # numbers of the twists of a chunk of cases
@@ -36,6 +37,8 @@ class GeneralSolver:
     def __init__(self, parameters: ParameterSet, *, weight: bool, compiled: CompiledModel | None = None) -> None:
         """Take the parameters, and compiled solvers for the equilibria of the robot as it is."""
         self._parameters, self._weight, self._compiled = parameters, weight, compiled
+        looped = compiled is not None and not compiled.unknowns.is_unrolled
+        self._varied = VariedChains(compiled, parameters) if looped and compiled is not None else None
         self._at, self._change = lru_cache(maxsize=16)(self._model), lru_cache(maxsize=4)(self._model_change)
 
     def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[GeneralResponses, FloatArray, FloatArray]:
@@ -47,26 +50,22 @@ class GeneralSolver:
         """
         size = len(values)
         change = self._change(values) if slopes else ModelChange(size, {})
-        model, compiled = self._at(values), self._compiled
+        model, compiled, chain = self._at(values)
         robot = ChangingRobot(model, change, dict(zip(self._parameters.names, values, strict=True)), None)
-        same = compiled is not None and compiled.model == model
-        responses = GeneralResponses(robot, self._weight, compiled if same else None, self._chain_responses if same else None)
+        responses = GeneralResponses(robot, self._weight, compiled, chain)
         return responses, np.array(values).reshape(1, size), np.eye(size) if slopes else np.zeros((size, 0))
 
-    @cached_property
-    def _chain_responses(self) -> ChainResponses | None:
-        """The compiled derivatives of the robot as it is; None of chains that are not looped."""
-        compiled = self._compiled
-        if compiled is None or compiled.unknowns.is_unrolled:
-            return None
-        return ChainResponses(compiled, weight=self._weight)
-
-    def _model(self, values: tuple[float, ...]) -> SoftModel:
+    def _model(self, values: tuple[float, ...]) -> tuple[SoftModel, CompiledModel | None, ChainResponses | None]:
+        """Return the robot, its compiled solvers, and their derivatives; None where there are none."""
         present = self._parameters.present
         model = self._parameters.model(values) if np.any(self._parameters.of_model) else present
         if (model.springs.names, model.n_motors) != (present.springs.names, present.n_motors):
             raise ParameterError("parameters", values, "values with which the robot has the same joints and actuators")
-        return model
+        compiled = self._compiled
+        if compiled is not None and compiled.model != model:
+            compiled = None if self._varied is None else self._varied.at(model)
+        chain = None if self._varied is None or compiled is None else ChainResponses(compiled, weight=self._weight)
+        return model, compiled, chain
 
     def _model_change(self, values: tuple[float, ...]) -> ModelChange:
         return model_change(self._parameters, values)

@@ -7,9 +7,11 @@ already, to second order: minus the mean torque of the sums times the gap, plus 
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
-from softrobots.compiled.chain.elements import constants, vector
+from softrobots.compiled.chain.elements import vector
 from softrobots.compiled.chain.elimination import eliminate_multipliers
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Segment
@@ -26,10 +28,9 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
         base, and solve for them there on the step pass; and the size of the record.
     """
     chain, recursion, tip, infix = plan.unknowns.chain, plan.recursion, plan.tip, plan.infix
-    softness = [float(np.sum(1.0 / chain.stiffness[list(chain.constrained[group])])) for group in segment.groups]  # of each sum
-    count = len(softness)
+    count = len(segment.groups)
     add = Block(f"add_multipliers_{infix}{number}", "Set the tensions of a segment, and add its multipliers, without coupling.")
-    _set_tensions(plan, add, segment)
+    _set_tensions(plan, add, number, segment)
     if count == 0:
         return [add], 0
     add.store_all(recursion.matrix + 6, [0.0] * (count * (count + 7) // 2))
@@ -39,6 +40,7 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
     for place in plan.columns:
         add.store_all(place + 3, [0.0] * count)
     eliminate = Block(f"eliminate_multipliers_{infix}{number}", "Eliminate the multipliers of a segment.", ("at",))
+    softness = sum_numbers(plan, eliminate, number, segment)[0].tolist()
     outboard, state = plan.load_outboard(eliminate, 3 + count)
     gaps: list[Scalar] = [0.0] * count
     slope: Scalar = 0.0
@@ -80,7 +82,20 @@ def segment_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Bloc
     return [add, eliminate, solve], size
 
 
-def _set_tensions(plan: Plan, block: Block, segment: Segment) -> None:
+def sum_numbers(plan: Plan, block: Block, number: int, segment: Segment) -> Any:
+    """Return numbers of the constrained sums of a segment: compliances, rest and stiffness of the first strain, and slopes.
+
+    Shape (3 + M, n_groups), with the derivative of the sums by the length of each of the M muscles of the robot.
+    """
+    chain = plan.unknowns.chain
+    groups = [list(chain.constrained[group]) for group in segment.groups]
+    first = [group[0] for group in groups]  # all strains of a sum have the same torque at the start
+    softness = [float(np.sum(1.0 / chain.stiffness[group])) for group in groups]
+    slopes = chain.constrained_slope[list(segment.groups)].T
+    return plan.numbers(block, f"SUMS_{number}", np.vstack([softness, chain.rest[first], chain.stiffness[first], slopes]))
+
+
+def _set_tensions(plan: Plan, block: Block, number: int, segment: Segment) -> None:
     """Write the tensions of a segment: as given, or as of the multipliers of the last point and the preload of the start."""
     chain, layout, recursion = plan.unknowns.chain, plan.layout, plan.recursion
     if not segment.groups:
@@ -88,15 +103,9 @@ def _set_tensions(plan: Plan, block: Block, segment: Segment) -> None:
         return
     held = [block.load(layout.held + group) for group in segment.groups]
     block.store_all(recursion.multipliers, held)
-    first = [chain.constrained[group][0] for group in segment.groups]  # all strains of a sum have the same torque at the start
-    preload = vector(
-        [
-            (block.load(layout.start + plan.unknowns.place[strain]) - float(chain.rest[strain]))
-            * float(chain.stiffness[strain])
-            for strain in first
-        ]
-    )
-    for number, muscle in enumerate(segment.muscles):
-        shares = constants(chain.constrained_slope[list(segment.groups), muscle])
-        block.store(recursion.preload + number, shares @ preload)
-        block.store(recursion.tensions + number, shares @ (vector(held) - preload))
+    _, rest, stiffness, *slopes = sum_numbers(plan, block, number, segment)
+    first = [plan.unknowns.place[chain.constrained[group][0]] for group in segment.groups]
+    preload = (vector([block.load(layout.start + place) for place in first]) - rest) * stiffness
+    for place, muscle in enumerate(segment.muscles):
+        block.store(recursion.preload + place, slopes[muscle] @ preload)
+        block.store(recursion.tensions + place, slopes[muscle] @ (vector(held) - preload))

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from softrobots.compiled.chain.elements import constants, vector
 from softrobots.compiled.chain.layout import TipLayout
+from softrobots.compiled.chain.looped_elements import leading_elements
 from softrobots.compiled.chain.looped_tip import leading_motors
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unrolled_chain import seen_backwards
@@ -67,7 +68,7 @@ def _start(plan: Plan, tip: TipLayout) -> Block:
 def _start_turn(plan: Plan, tip: TipLayout) -> Block:
     block = Block("start_turn", "Clear the sums of the given right-hand side, and turn all by the leading motors.")
     block.store_all(tip.column, [0.0] * (tip.base_force - tip.column))
-    leading = plan.unknowns.leading(block)
+    leading = leading_elements(plan, block)
     turn = constants([0.0, 0.0, 0.0])
     for row, (element, outward_pass) in enumerate(zip(leading, seen_backwards(leading), strict=True)):
         if element.kind == "turn":

@@ -17,6 +17,7 @@ from __future__ import annotations
 from softrobots.compiled.chain.elements import Load, Motion, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import RecursionLayout, TipLayout
+from softrobots.compiled.chain.looped_elements import leading_elements
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance, inward
 from softrobots.compiled.chain.unrolled_chain import seen_backwards
@@ -73,7 +74,7 @@ def _finish(plan: Plan, tip: TipLayout) -> Block:
 def leading_motors(plan: Plan, block: Block) -> list[tuple[int, Motion]]:
     """Return number and motion of each leading motor, from the tip on; the loads are those behind the inward pass."""
     unknowns, recursion = plan.unknowns, plan.recursion
-    leading, loads = unknowns.leading(block), []
+    leading, loads = leading_elements(plan, block), []
     motors = [motor for row in range(len(leading)) if (motor := unknowns.motor(row)) is not None]
     for place in (0, 3) if plan.weight else (0,):
         force, lever = block.loads(recursion.force + place, 3), block.loads(recursion.lever + place, 3)

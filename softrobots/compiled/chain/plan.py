@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
+from typing import Any
+
+import numpy as np
 
 from softrobots.compiled.chain.elements import symmetric, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Outboard
 from softrobots.compiled.chain.layout import Layout, RecursionLayout, TipLayout
 from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.expressions import Expression, Scalar
-from softrobots.compiled.trace.numbers import NumberInputs
+from softrobots.compiled.trace.numbers import NumberInputs, TableInputs
 from softrobots.model.serial_chain import SerialChain
 
 
@@ -29,8 +32,10 @@ class Plan:
     """Whether targets of the tip are poses."""
     tip: TipLayout | None = None
     """Places of the response of the tip, or to given loads and motions, in code of looped chains that traces it."""
-    inputs: NumberInputs | None = None
+    inputs: NumberInputs | TableInputs | None = None
     """The numbers of the chain that are inputs of the code; None if all are constants."""
+    tables: dict[str, TableColumns] = field(default_factory=dict)
+    """The tables of numbers so far, of a looped chain."""
 
     def __post_init__(self) -> None:
         """Join the joints of sections along which actuators wind."""
@@ -38,8 +43,22 @@ class Plan:
 
     def numbers_in(self, block: Block) -> SerialChain:
         """Return the chain with expressions of a block instead of the numbers that are inputs."""
-        chain = self.unknowns.chain
-        return chain if self.inputs is None else self.inputs.traced(chain, block.loads(self.layout.numbers, self.inputs.count))
+        chain, inputs = self.unknowns.chain, self.inputs
+        if not isinstance(inputs, NumberInputs):
+            return chain
+        return inputs.traced(chain, block.loads(self.layout.numbers, inputs.count))
+
+    def table(self, block: Block, name: str, count: int, base: str = "row") -> TableColumns:
+        """Begin a table of numbers of `count` elements of a looped chain, an input if one of the numbers is."""
+        columns = self.tables[name] = TableColumns(block, name, count, base)
+        if isinstance(self.inputs, TableInputs) and name in self.inputs.columns:
+            first, own = self.inputs.columns[name]
+            columns.given = [None if one is None else self.layout.numbers + first + one for one in own]
+        return columns
+
+    def numbers(self, block: Block, name: str, values: Any) -> Any:
+        """Return numbers of a looped chain, of any shape, as constants and inputs."""
+        return self.table(block, name, 1, "").entries(np.asarray(values)[None])
 
     @cached_property
     def layout(self) -> Layout:

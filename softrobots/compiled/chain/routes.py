@@ -14,6 +14,7 @@ import numpy as np
 
 from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.unknowns import Segment, Unknowns
+from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.model.dry_friction import DryFriction
 from softrobots.model.serial_chain import strains_of
 
@@ -43,6 +44,9 @@ class Routed(Protocol):
     @property
     def routes(self) -> Routes:
         """The routes."""
+
+    def table(self, block: Block, name: str, count: int) -> TableColumns:
+        """Begin a table of numbers of `count` elements."""
 
 
 @dataclass(frozen=True)

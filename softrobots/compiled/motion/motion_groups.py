@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.compiled.chain.elements import constants
-from softrobots.compiled.chain.looped_chain import element_signature, table_element
+from softrobots.compiled.chain.looped_elements import element_signature, table_element
 from softrobots.compiled.chain.muscle_terms import pulls_on
 from softrobots.compiled.chain.recursion import range_margin
 from softrobots.compiled.chain.traced_elements import TracedElement

@@ -23,6 +23,7 @@ from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.routes import Routes
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.motion.held_motion import HeldMotion, held_motion
+from softrobots.compiled.trace.blocks import Block, TableColumns
 
 
 @dataclass(frozen=True)
@@ -102,6 +103,10 @@ class MotionRoutes:
     def routes(self) -> Routes:
         """The routes."""
         return Routes(self.unknowns, self.first)
+
+    def table(self, block: Block, name: str, count: int) -> TableColumns:
+        """Begin a table of numbers of `count` elements."""
+        return TableColumns(block, name, count)
 
     @property
     def held(self) -> bool:

@@ -24,7 +24,7 @@ from softrobots.compiled.program.response_program import ResponsePlaces, respons
 from softrobots.compiled.program.unrolled_program import equilibrium_blocks
 from softrobots.compiled.statuses import Status
 from softrobots.compiled.trace.blocks import Block
-from softrobots.compiled.trace.numbers import NumberInputs
+from softrobots.compiled.trace.numbers import NumberInputs, TableInputs
 
 
 @dataclass(frozen=True)
@@ -47,14 +47,16 @@ class Program:
     """Places of rates and weights of derivatives; None in code without them."""
 
 
-def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False, inputs: NumberInputs | None = None) -> Program:
+def make_program(
+    unknowns: Unknowns, *, weight: bool, poses: bool = False, inputs: NumberInputs | TableInputs | None = None
+) -> Program:
     """Generate the code of a robot.
 
     Args:
         unknowns: The robot.
         weight: Whether there is gravity.
         poses: Whether targets of the tip are poses.
-        inputs: Numbers of the robot that are inputs, of code with derivatives, for unrolled chains.
+        inputs: Numbers of the robot that are inputs, in unrolled chains of code with derivatives.
     """
     plan = Plan(unknowns, weight, poses, inputs=inputs)
     layout = plan.layout
@@ -91,7 +93,7 @@ def make_program(unknowns: Unknowns, *, weight: bool, poses: bool = False, input
     elif not layout.guides:
         lane_functions = [one for one in lane_functions if one not in lane_drivers.MOTOR_FUNCTIONS]
     responses = None
-    if inputs is not None:
+    if isinstance(inputs, NumberInputs):
         responses = ResponsePlaces(size, layout.motors, layout.unknowns, inputs.count)
         lane_size = size = responses.end
         tables |= {"NUMBER_WEIGHTS": responses.number}

@@ -10,16 +10,18 @@ from softrobots.compiled.drivers.lane_drivers import load_block, store_block
 from softrobots.compiled.program.generated_module import Program, functions_of, lane_count, lane_text, module_text
 from softrobots.compiled.program.looped_program import looped_response
 from softrobots.compiled.program.manual import on_a_line
+from softrobots.compiled.trace.numbers import TableInputs
 
 
-def make_given_program(unknowns: Unknowns, *, weight: bool) -> Program:
+def make_given_program(unknowns: Unknowns, *, weight: bool, inputs: TableInputs | None = None) -> Program:
     """Generate the code; see `softrobots.compiled.chain.looped_response`.
 
     Args:
         unknowns: The robot, whose chain is looped.
         weight: Whether there is gravity.
+        inputs: Numbers of the robot that are inputs.
     """
-    plan = Plan(unknowns, weight)
+    plan = Plan(unknowns, weight, inputs=inputs)
     parts = looped_response(plan)
     values: dict[str, object] = {name: value for name, value in vars(settings).items() if name.isupper()}
     values |= plan.layout.constants() | parts.constants

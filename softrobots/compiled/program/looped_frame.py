@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from softrobots.compiled.chain.elements import Load, constants, vector
+from softrobots.compiled.chain.elements import Load, Vector, constants, vector
 from softrobots.compiled.chain.layout import Layout
+from softrobots.compiled.chain.looped_elements import leading_elements
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.recursion import Balance
 from softrobots.compiled.chain.unrolled_chain import place_base
@@ -30,8 +31,8 @@ def looped_frame(plan: Plan, count: int) -> list[Block]:
 
 def _prepare(plan: Plan, count: int) -> Block:
     block = Block("prepare", "Compute what depends on motors and load only.")
-    unknowns, layout, recursion = plan.unknowns, plan.layout, plan.recursion
-    axes, origin = place_base(unknowns.leading(block))
+    layout, recursion = plan.layout, plan.recursion
+    axes, origin = place_base(leading_elements(plan, block))
     for place, load in ((0, layout.force), (3, layout.gravity)):
         block.store_all(recursion.force + place, (axes.T @ vector(block.loads(load, 3))).tolist())
     block.store_all(layout.held, [0.0] * layout.constraints)
@@ -55,7 +56,7 @@ def _start_inward(plan: Plan) -> Block:
     block = Block("start_inward", "Start the inward pass at the tip, and clear all sums.")
     recursion = plan.recursion
     axes = vector(block.loads(recursion.axes, 9)).reshape(3, 3)
-    lever = (axes @ constants(plan.unknowns.chain.tip_translation)).tolist()
+    lever = (axes @ tip_from_end(plan, block)).tolist()
     block.store_all(recursion.lever, [*lever, 0.0, 0.0, 0.0] if plan.weight else lever)
     block.store_all(recursion.matrix, [0.0] * 6)
     block.store_all(recursion.column, [0.0] * 3)
@@ -63,6 +64,11 @@ def _start_inward(plan: Plan) -> Block:
     block.store_all(recursion.sums, [0.0, 0.0, 1.0, 1.0, 0.0])
     block.store_all(recursion.steps, [0.0, 0.0, 0.0])
     return block
+
+
+def tip_from_end(plan: Plan, block: Block) -> Vector:
+    """Return the tip in the frame of the last element, shape (3,) [m]."""
+    return plan.numbers(block, "TIP", plan.unknowns.chain.tip_translation)
 
 
 def _finish(plan: Plan) -> Block:
@@ -109,5 +115,8 @@ def _start(layout: Layout) -> Block:
 def _relax(plan: Plan) -> Block:
     block = Block("relax", "Put an unknown where its spring is relaxed.", ("i",))
     rest = set(plan.unknowns.rest)
-    block.store(plan.layout.unknown, rest.pop() if len(rest) == 1 else block.table("REST", 0, "i"), "i")
+    relaxed = rest.pop() if len(rest) == 1 else block.table("REST", 0, "i")
+    if plan.inputs is not None:
+        relaxed = block.load(plan.layout.start, "i")
+    block.store(plan.layout.unknown, relaxed, "i")
     return block

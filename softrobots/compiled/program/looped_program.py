@@ -160,7 +160,7 @@ def _constants(plan: Plan, kinds: Sequence[Kind], sequence: Sequence[_Step]) -> 
     end = plan.recursion.end
     constants: dict[str, object] = {"FIRST": end + 1, "COUNT": end + 2, "N_ELEMENTS": len(sequence)}
     constants |= {"GUIDE_ENERGY": plan.recursion.sums} if plan.routes.guided else {}
-    constants |= {f"TABLE_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
+    constants |= {f"TABLE_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.numbers}
     steps = dict(zip(("KIND", "AT", "ROW", "PLACE", "ELEMENT"), zip(*sequence, strict=True), strict=True))
     return constants | {name: values for name, values in steps.items() if name != "ELEMENT" or plan.unknowns.routed}
 
@@ -179,7 +179,7 @@ def _along_routes(plan: Plan) -> tuple[list[Block], list[tuple[str, str]], dict[
             (components_text(held=plan.unknowns.held_lengths, rubbing=plan.routes.guided), name),
         ]
         if columns:
-            tables |= plan.routes.tables() | {f"POINT_TABLE_{name}": tuple(columns.numbers)}
+            tables |= plan.routes.tables() | ({f"POINT_TABLE_{name}": tuple(columns.numbers)} if columns.numbers else {})
     return blocks, loops, tables
 
 

@@ -5,7 +5,8 @@ The laws of the tensions are those of `softrobots.model.actuator_laws`.
 
 from __future__ import annotations
 
-from typing import NamedTuple
+from collections.abc import Sequence
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -33,28 +34,62 @@ class Tension(NamedTuple):
     """Energy whose derivative by the length is the tension [J]."""
 
 
-def tension(tag: ActuatorTag, given: Scalar, beyond: Scalar) -> Tension:
+def law_numbers(tag: ActuatorTag) -> tuple[float, ...]:
+    """Return the numbers of the law of an actuator, as many of each kind; see `tension`."""
+    if tag.kind == "elastic":
+        return tag.rest_length, tag.stiffness, tag.pretension
+    if tag.kind == "mckibben":
+        square, least = pull_factors(tag)
+        return tag.rest_length, square, least, (least / square) ** 0.5
+    return (tag.area,) if tag.kind == "pressure" else ()
+
+
+def tension(kind: str, numbers: Sequence[Scalar], given: Scalar, beyond: Scalar) -> Tension:
     """Trace the tension of an actuator.
 
     Args:
-        tag: The actuator.
+        kind: Its kind.
+        numbers: Its `law_numbers`.
         given: Its input: tension [N], pressure [Pa] or length of the motor [m].
         beyond: Its length beyond that at rest [m].
     """
-    if tag.kind == "elastic":
-        pull = (beyond - (given - tag.rest_length)) * tag.stiffness + tag.pretension
+    if kind == "elastic":
+        length, stiffness, pretension = numbers
+        pull = (beyond - (given - length)) * stiffness + pretension
         taut = if_less(0.0, pull, pull, 0.0)
-        slope = if_less(ROUNDING * tag.stiffness * tag.rest_length, pull, tag.stiffness, 0.0)
-        return Tension(taut, slope, taut * taut * (0.5 / tag.stiffness))
-    if tag.kind == "mckibben":
-        square, least = pull_factors(tag)
-        share, slack = beyond * (1.0 / tag.rest_length) + 1.0, (least / square) ** 0.5
+        slope = if_less(ROUNDING * stiffness * length, pull, stiffness, 0.0)
+        return Tension(taut, slope, taut * taut * (0.5 / stiffness))
+    if kind == "mckibben":
+        length, square, least, slack = numbers
+        share = beyond * (1.0 / length) + 1.0
         force = share * share * square - least
-        work = ((share * share + share * slack + slack * slack) * (square / 3.0) - least) * (share - slack) * tag.rest_length
-        parts = (force, share * (2.0 * square / tag.rest_length), work)
+        work = ((share * share + share * slack + slack * slack) * (square / 3.0) - least) * (share - slack) * length
+        parts = (force, share * (2.0 * square / length), work)
         return Tension(*(given * if_less(slack * (1.0 + ROUNDING), share, one, 0.0) for one in parts))
-    value = given * -tag.area if tag.kind == "pressure" else given
+    value = given * -numbers[0] if kind == "pressure" else given
     return Tension(value, 0.0, value * beyond)
+
+
+def muscle_numbers(plan: Plan, block: Block, muscle: int) -> list[Scalar]:
+    """Return by how much an actuator is longer at zero strain than at rest [m], and the numbers of its law."""
+    chain = plan.unknowns.chain
+    values = [float(chain.muscle_paths.straightened[muscle]), *law_numbers(chain.actuators[muscle])]
+    return [*plan.numbers(block, f"MUSCLE_{muscle}", values)]
+
+
+def held_numbers(plan: Plan, block: Block, number: int, segment: Segment) -> tuple[Any, Any, Any]:
+    """Return numbers of the given lengths of a segment.
+
+    Returns:
+        Combinations of them that the robot can choose, shape (c, M), the compliance of each, (c,), lengths at rest, (M,) [m].
+    """
+    chain, muscles = plan.unknowns.chain, list(segment.stretched)
+    shares = held_factors(chain.spread[:, muscles])[1]
+    shares = np.eye(len(muscles)) if len(shares) == len(muscles) else shares
+    softness = ((shares @ chain.muscle_paths.at(chain.rest).arms[muscles]) ** 2 / chain.stiffness).sum(axis=1)
+    values = [shares.ravel(), softness, chain.muscle_paths.rest[muscles]]
+    every = plan.numbers(block, f"HELD_{number}", np.concatenate(values))
+    return every[: shares.size].reshape(shares.shape), *np.split(every[shares.size :], [len(shares)])
 
 
 def keep_lengths(plan: Routed, number: int, segment: Segment) -> Block:
@@ -78,8 +113,9 @@ def start_lengths(plan: Plan, number: int, segment: Segment) -> Block:
             block.store(routes.tensions + place, tension_held)
             block.store(routes.pulled + muscle, tension_held)
             continue
-        beyond = block.load(routes.changes + muscle) + float(chain.muscle_paths.straightened[muscle])
-        pull = tension(chain.actuators[muscle], block.load(layout.actuators + muscle), beyond)
+        straightened, *law = muscle_numbers(plan, block, muscle)
+        beyond = block.load(routes.changes + muscle) + straightened
+        pull = tension(chain.actuators[muscle].kind, law, block.load(layout.actuators + muscle), beyond)
         energy = energy + pull.energy
         block.store(routes.tensions + place, pull.value)
         block.store(routes.pulled + muscle, pull.value)
@@ -107,12 +143,10 @@ def held_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block],
         The functions, and the size of their record.
     """
     routes, recursion, layout, tip = plan.routes, plan.recursion, plan.layout, plan.tip
-    chain, muscles, all_ = plan.unknowns.chain, list(segment.stretched), routes.components
-    shares = held_factors(chain.spread[:, muscles])[1]
-    shares = np.eye(len(muscles)) if len(shares) == len(muscles) else shares
-    softness = ((shares @ chain.muscle_paths.at(chain.rest).arms[muscles]) ** 2 / chain.stiffness).sum(axis=1)
-    count, shares = len(muscles), constants(shares)
+    muscles, all_ = list(segment.stretched), routes.components
+    count = len(muscles)
     eliminate = Block(f"eliminate_lengths_{plan.infix}{number}", "Eliminate the given lengths of a segment.", ("at",))
+    shares, softness, rest = held_numbers(plan, eliminate, number, segment)
     inner, state = plan.load_outboard(eliminate, 3)
     cross = vector(eliminate.loads(routes.cross, 3 * count)).reshape(count, 3)
     square = vector(eliminate.loads(routes.square, all_ * all_)).reshape(all_, all_)[:count, :count]
@@ -121,8 +155,8 @@ def held_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block],
     columns = [vector([*one, *(shares @ own)]) for one, own in zip(inner.columns, sums, strict=True)]
     gaps = constants(np.zeros(len(shares)))
     if tip is None:
-        given_lengths = [eliminate.load(layout.actuators + one) - float(chain.muscle_paths.rest[one]) for one in muscles]
-        gaps = shares @ (vector([eliminate.load(routes.changes + one) for one in muscles]) - vector(given_lengths))
+        given_lengths = vector([eliminate.load(layout.actuators + one) for one in muscles]) - rest
+        gaps = shares @ (vector([eliminate.load(routes.changes + one) for one in muscles]) - given_lengths)
     whole = Outboard(matrix, columns, inner.min_pivot, inner.n_negative_pivots)
     given = [shares @ vector(one) for one in plan.given_gaps(eliminate, muscles)]
     eliminated, beyond = eliminate_multipliers(whole, gaps, softness.tolist(), *given)
@@ -142,7 +176,7 @@ def held_blocks(plan: Plan, number: int, segment: Segment) -> tuple[list[Block],
         slope: Scalar = arriving[-2]
         error: Scalar = arriving[-1]
         for old, change, gap, soft in zip(shares @ held, changes[0], gaps, softness, strict=True):
-            torque = gap * float(1.0 / soft)
+            torque = gap * (1.0 / soft)
             energy = energy + gap * (old + change + torque * 0.5)
             slope = slope - gap * (change + torque)
             error = error + torque * torque

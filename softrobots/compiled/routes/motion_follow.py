@@ -6,7 +6,7 @@ from softrobots.compiled.chain.elements import upper_triangle
 from softrobots.compiled.chain.unknowns import Segment
 from softrobots.compiled.motion.motion_groups import OUT_OF_RANGE
 from softrobots.compiled.motion.motion_routes import MotionRoutes
-from softrobots.compiled.routes.ends import tension
+from softrobots.compiled.routes.ends import law_numbers, tension
 from softrobots.compiled.routes.terms import Form
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, if_less
@@ -77,7 +77,8 @@ def find_tensions(routes: MotionRoutes, number: int, segment: Segment) -> Block:
     block = Block(f"find_tensions_{number}", "Find the tensions of the actuators of a segment.")
     for place, muscle in enumerate(segment.muscles):
         beyond: Scalar = block.load(own.changes + muscle) + float(chain.muscle_paths.straightened[muscle])
-        pull = tension(chain.actuators[muscle], block.load(chain.n_motors + muscle), beyond)
+        tag = chain.actuators[muscle]
+        pull = tension(tag.kind, law_numbers(tag), block.load(chain.n_motors + muscle), beyond)
         block.store(own.tensions + place, pull.value)
         if muscle in segment.stretched:
             block.store(routes.stiffness + routes.stretched.index(muscle), pull.slope)

@@ -87,14 +87,11 @@ def length_blocks(plan: Routed, name: str, form: Form, swerving: int | None = No
     begin = Block(f"clear_pulls_{name}", "Clear the sums over the actuators beside an element.")
     begin.store_all(routes.load, [0.0] * k)
     begin.store_all(routes.curvature, [0.0] * (k * (k + 1) // 2))
-    rows = {row for row in routes.beside if form_of(plan, row) == form}
-    own = [pair for pair in routes.paths() if pair[0] in rows]
-    if not own:
-        return [clear, load, begin], None
-    paths = [pair if pair[0] in rows else own[0] for pair in routes.paths()]  # the other rows of the table are not read
     add = Block(f"add_length_{name}", "Add a point to length and slopes of an actuator.", ("row", "q", "at", "number", "point"))
-    columns = TableColumns(add, f"POINT_TABLE_{name}", len(paths))
-    point = _point(plan, form, paths, columns)
+    found = form_point(plan, name, form, add)
+    if found is None:
+        return [clear, load, begin], None
+    point, columns = found
     if form.section:
         _add_section_point(plan, form, add, point)
     else:
@@ -120,9 +117,15 @@ def length_blocks(plan: Routed, name: str, form: Form, swerving: int | None = No
     return blocks, columns
 
 
-def _point(plan: Routed, form: Form, paths: Sequence[tuple[int, int]], columns: TableColumns) -> _Point:
-    """Return a point of a route, as entries of the table of all."""
+def form_point(plan: Routed, name: str, form: Form, block: Block) -> tuple[_Point, TableColumns] | None:
+    """Return a point of a route beside elements of a form, as entries of the table of all, and the table; None if none is."""
     chain, given = plan.unknowns.chain, plan.unknowns.chain.muscle_paths
+    paths, rows = plan.routes.paths(), {row for row in plan.routes.beside if form_of(plan, row) == form}
+    first = next((pair for pair in paths if pair[0] in rows), None)
+    if first is None:
+        return None
+    paths = [pair if pair[0] in rows else first for pair in paths]  # the other rows of the table are not read
+    columns = plan.table(block, f"POINT_TABLE_{name}", len(paths))
     own = []  # places of the coordinates of the element in the path
     for row, path in paths:
         places = given.places[path].tolist()
@@ -136,7 +139,7 @@ def _point(plan: Routed, form: Form, paths: Sequence[tuple[int, int]], columns: 
     turns = [
         [given.turned[path] if np.any(given.across[path, 0, place]) else 0.0] for path, place in zip(numbers, own, strict=True)
     ]
-    return _Point(
+    point = _Point(
         columns.entry([float(given.length[path]) for path in numbers]),
         arms,
         columns.entries(turns)[0],
@@ -145,6 +148,7 @@ def _point(plan: Routed, form: Form, paths: Sequence[tuple[int, int]], columns: 
         columns.entry([float(given.separable[path]) for path in numbers]),
         [0.0 if place in form.moving else columns.entry([one[place] for one in locked]) for place in range(len(locked[0]))],
     )
+    return point, columns
 
 
 def _add_section_point(plan: Routed, form: Form, block: Block, point: _Point) -> None:

@@ -20,8 +20,9 @@ _CLOSING_STEPS = 8  # of the sums to the muscle lengths, where segments are twis
 class Actuation:
     """Maps of motors and muscle tensions (identity) and of muscle lengths (start of the strains)."""
 
-    def __init__(self, model: SoftModel, unknowns: Unknowns) -> None:
-        """Prepare the linear maps."""
+    def __init__(self, model: SoftModel, unknowns: Unknowns, numbers: FloatArray | None = None) -> None:
+        """Prepare the linear maps; `numbers` are those of the robot that are inputs of its code, None without any."""
+        self._numbers = numbers
         self.model, self._chain, self._strains = model, unknowns.chain, list(unknowns.strains)
         chain = unknowns.chain
         self._count = chain.n_motors
@@ -64,8 +65,10 @@ class Actuation:
         run.put(w, 0, motors[: self._count])
         if self._tensions or self._held:
             run.put(w, layout.actuators, motors[self._count :])
-        if self._lengths:
+        if self._lengths or self._numbers is not None:
             run.put(w, layout.start, self._starts(motors[None]))
+        if self._numbers is not None:
+            run.put(w, layout.numbers, self._numbers)
         for name, values in numbers.items():
             run.put(w, getattr(layout, name), values)
         return w
@@ -136,6 +139,10 @@ class Actuation:
         if self._lengths:
             starts = self._starts(motors)
             inputs += [(layout.start, starts), (layout.unknown, starts)]
+        elif self._numbers is not None:
+            inputs.append((layout.start, self._starts(motors[:1])))
+        if self._numbers is not None:
+            inputs.append((layout.numbers, self._numbers[None]))
         return inputs
 
     def unsuited(self, motors: FloatArray) -> Any:
@@ -198,6 +205,8 @@ class Actuation:
         return np.asarray(strains @ self._chain.elastic.T)
 
     def _starts(self, motors: FloatArray) -> FloatArray:
+        if not self._lengths:
+            return self._chain.rest[None, self._strains]
         change = motors[:, self._count :] - self._chain.muscle_paths.rest
         return np.ascontiguousarray((self._relaxed + change @ self._chain.spread.T)[:, self._strains])
 

@@ -3,28 +3,47 @@
 from __future__ import annotations
 
 import re
-from typing import Any
+from typing import Any, NamedTuple
 
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import make_program
+from softrobots.compiled.program.given_program import make_given_program
 from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
-from softrobots.core.checks import positive_integer
+from softrobots.compiled.trace.numbers import TableInputs
+from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.step_control import order_of_steps
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 
 
+class SharedCode(NamedTuple):
+    """Code of looped chains of one structure, which takes their numbers as inputs, for one of them."""
+
+    unknowns: Unknowns
+    """The chain that it is made for."""
+    inputs: TableInputs
+    """The numbers that are inputs."""
+    numbers: FloatArray
+    """Those of the robot, shape (k,)."""
+    runs: dict[Any, Any]
+    """The code, filled on first use."""
+
+
 class CompiledCode:
     """The generated code of a robot; see `softrobots.compiled.run.compiled_model.CompiledModel`."""
 
-    def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
-        """Read the robot."""
+    def __init__(
+        self, model: SoftModel, backend: str, locked_strains: tuple[str, ...], shared: SharedCode | None = None
+    ) -> None:
+        """Read the robot; `shared` is code that takes its numbers as inputs."""
         self._model, self._backend = model, backend
         self._chain = model.chain()
         self._unknowns = Unknowns(self._chain, locked_strains)
-        self._runs: dict[tuple[bool, bool], Any] = {}
+        self._inputs = None if shared is None else shared.inputs
+        self._made_for = self._unknowns if shared is None else shared.unknowns
+        self._runs: dict[Any, Any] = {} if shared is None else shared.runs
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickle as the robot and its options; the other process compiles it again, or finds the code in its cache."""
@@ -140,6 +159,13 @@ class CompiledCode:
                 kind = f"{self._chain.n_motors} motors and {len(self._chain.elements)} joints and sections"
                 requirement = f"positions for this robot, it has {kind}; poses need six motors and a chain that is unrolled"
                 raise ParameterError("targets", "poses", f"{requirement} (softrobots.solve_ik takes poses of every robot)")
-            program = make_program(self._unknowns, weight=weight, poses=poses)
+            program = make_program(self._made_for, weight=weight, poses=poses, inputs=self._inputs)
             run = self._runs[weight, poses] = make_run(program, self._backend)
         return run
+
+    def given_run(self, weight: bool) -> Any:
+        """Return the code of the response of a looped chain to given loads and motions, generated on first use."""
+        if ("given", weight) not in self._runs:
+            program = make_given_program(self._made_for, weight=weight, inputs=self._inputs)
+            self._runs["given", weight] = make_run(program, self._backend)
+        return self._runs["given", weight]

@@ -28,7 +28,6 @@ from softrobots.dynamics.starting import first_kick, first_state
 from softrobots.dynamics.step_control import order_of_steps
 from softrobots.dynamics.time_grid import grid_with_stops, steps_and_rows
 from softrobots.dynamics.time_inputs import MOST_KINKS, MotorPath, TimeLoad
-from softrobots.model.soft_model import SoftModel
 
 _COMPARED = 401  # times at which tips of two runs are compared, besides those of the rows
 
@@ -39,12 +38,12 @@ class CompiledDynamics(CompiledStatics):
     See `softrobots.compiled.run.compiled_model.CompiledModel`, which adds load estimation and inverse kinematics.
     """
 
-    def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
-        """Generate and load the code; call `softrobots.compile` instead."""
-        super().__init__(model, backend, locked_strains)
+    def __init__(self, *given: Any) -> None:
+        """Generate and load the code, see `CompiledStatics`; call `softrobots.compile` instead."""
+        super().__init__(*given)
         self._motion_runs: dict[tuple[bool, int], Any] = {}
         self._moving = list(moving_coordinates(self._unknowns))
-        self._damping = MotionDamping(model, self._unknowns.strains, self._moving)
+        self._damping = MotionDamping(self._model, self._unknowns.strains, self._moving)
 
     def simulate(
         self,

@@ -61,9 +61,9 @@ class CompiledModel(CompiledDynamics):
     friction from the state before. Safe to share between threads.
     """
 
-    def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
-        """Generate and load the code; call `softrobots.compile` instead."""
-        super().__init__(model, backend, locked_strains)
+    def __init__(self, *given: Any) -> None:
+        """Generate and load the code, see `CompiledStatics`; call `softrobots.compile` instead."""
+        super().__init__(*given)
         self._estimate, self._torques = self._run(False).estimate, self._layout.torques
         self._plain_estimate = self._plain and self._unknowns.moved_by_motors
 

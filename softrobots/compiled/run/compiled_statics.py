@@ -9,7 +9,7 @@ import numpy as np
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
 from softrobots.compiled.run.certified import certified
-from softrobots.compiled.run.compiled_code import CompiledCode
+from softrobots.compiled.run.compiled_code import CompiledCode, SharedCode
 from softrobots.compiled.run.contact_batches import ContactSolver
 from softrobots.compiled.run.friction_states import StatesBefore, states_before
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
@@ -33,10 +33,12 @@ class CompiledStatics(CompiledCode):
     See `softrobots.compiled.run.compiled_model.CompiledModel`, which adds load estimation and inverse kinematics.
     """
 
-    def __init__(self, model: SoftModel, backend: str, locked_strains: tuple[str, ...]) -> None:
+    def __init__(
+        self, model: SoftModel, backend: str, locked_strains: tuple[str, ...], shared: SharedCode | None = None
+    ) -> None:
         """Generate and load the code; call `softrobots.compile` instead."""
-        super().__init__(model, backend, locked_strains)
-        self._actuation = Actuation(model, self._unknowns)
+        super().__init__(model, backend, locked_strains, shared)
+        self._actuation = Actuation(model, self._unknowns, None if shared is None else shared.numbers)
         self._shape = (model.n_motors,)
         self._motors = model.n_motors
         run = self._run(False)
@@ -45,8 +47,13 @@ class CompiledStatics(CompiledCode):
         self._heavy: Any = None  # the same of the code with weight, once it is made
         self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
-        self._plain = not self._unknowns.n_constraints and not self._layout.rubbing and backend == "numba"
+        self._plain = not (self._unknowns.n_constraints or self._layout.rubbing or self._layout.inputs) and backend == "numba"
         self._joints = self._chain.n_motors
+
+    @property
+    def actuation(self) -> Actuation:
+        """Maps between actuator and elastic coordinates and the workspace of the code."""
+        return self._actuation
 
     def equilibrium(
         self,

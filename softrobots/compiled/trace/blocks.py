@@ -209,21 +209,32 @@ def _element(array: str, base: str, offset: int, lanes: bool) -> str:
 
 
 class TableColumns:
-    """Numbers of the elements of a kind: equal ones are constants, others go into a table."""
+    """Numbers of the elements of a kind: equal ones are constants, others go into a table.
 
-    def __init__(self, block: Block, name: str, count: int) -> None:
-        """Begin a table for `count` elements."""
-        self._block, self._name, self._count = block, name, count
+    Of tables that are inputs (`softrobots.compiled.trace.numbers.TableInputs`) they stand in the workspace.
+    """
+
+    def __init__(self, block: Block, name: str, count: int, base: str = "row") -> None:
+        """Begin a table for `count` elements; `base` is the name of the place of the row of an element."""
+        self._block, self._name, self._count, self._base = block, name, count, base
         self._columns: list[tuple[float, ...]] = []
+        self.given: list[int | None] | None = None
+        """Of a table that is an input: the place of each number in the first row in the workspace; None for constants."""
+        self.seen: list[tuple[float, ...]] = []
+        """The numbers so far, each of all elements."""
 
     def entry(self, values: Sequence[Any]) -> Scalar:
         """Return a number of an element: a constant, or a table entry for the row of the element."""
-        if len(set(values)) == 1:
-            return float(values[0])
         column = tuple(float(value) for value in values)
+        self.seen.append(column)
+        if self.given is not None:
+            place = self.given[len(self.seen) - 1]
+            return column[0] if place is None else self._block.load(place, self._base)
+        if len(set(column)) == 1:
+            return column[0]
         if column not in self._columns:
             self._columns.append(column)
-        return self._block.table(self._name, self._columns.index(column), "row")
+        return self._block.table(self._name, self._columns.index(column), self._base)
 
     def entries(self, values: Any) -> Any:
         """Return the same for arrays, shape (count, ...)."""
@@ -236,7 +247,7 @@ class TableColumns:
     @property
     def width(self) -> int:
         """Count of numbers for one element."""
-        return len(self._columns)
+        return len(self._columns) if self.given is None else len({one for one in self.given if one is not None})
 
     @property
     def numbers(self) -> list[float]:

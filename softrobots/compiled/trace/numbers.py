@@ -1,11 +1,12 @@
 """The numbers of a chain on which its statics depends, and those of them that are inputs of generated code.
 
-Numbers that are not 0, 1 or -1 are inputs, so that one code serves all robots of a structure, whatever their parameters.
+In code of unrolled chains numbers that are not 0, 1 or -1 are inputs, so that one code serves all robots of a structure,
+whatever their parameters; in code of looped chains those that differ between robots that it is made for.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
@@ -88,3 +89,56 @@ class NumberInputs:
         left = iter(inputs)
         numbers = [next(left) if varied else value for value, varied in zip(self.constant.tolist(), self.varied, strict=True)]
         return with_numbers(chain, numbers)
+
+
+@dataclass(frozen=True, eq=False)
+class TableInputs:
+    """The numbers of a looped chain that are inputs of its code: whole tables in which one differs between some chains."""
+
+    seen: tuple[Mapping[str, FloatArray], ...]
+    """The tables of each of these chains by name, shape (rows, numbers); see `ChainNumbers`."""
+
+    @cached_property
+    def columns(self) -> dict[str, tuple[int, list[int | None]]]:
+        """By table that is an input: its first place, and the column of each number; None of constants."""
+        found, first = {}, 0
+        for name, table in self.seen[0].items():
+            each = np.stack([one[name] for one in self.seen])
+            if not np.all(_same(each, table)):
+                places: dict[bytes, int] = {}
+                own = [
+                    None if np.all(_same(one, one.flat[0])) else places.setdefault(one.tobytes(), len(places))
+                    for one in np.moveaxis(each, 2, 0)
+                ]
+                found[name] = first, own
+                first += len(table) * len(places)
+        return found
+
+    @property
+    def count(self) -> int:
+        """Number of inputs."""
+        return sum(len(self.seen[0][name]) * _width(own) for name, (_, own) in self.columns.items())
+
+    def values(self, tables: Mapping[str, FloatArray]) -> FloatArray | None:
+        """Return the inputs of a chain, shape (count,), from its tables; None if another number differs there."""
+        parts = [np.zeros(0)]
+        for name, given in self.seen[0].items():
+            own, table = self.columns.get(name, (0, [None] * given.shape[1]))[1], tables[name]
+            varied = np.array([one is not None for one in own], dtype=bool)
+            part, places = np.zeros((len(table), _width(own))), [one for one in own if one is not None]
+            part[:, places] = table[:, varied]
+            expected = given.copy()
+            expected[:, varied] = part[:, places]
+            if not np.all(_same(table, expected)):
+                return None
+            parts.append(part.ravel())
+        return np.concatenate(parts)
+
+
+def _width(columns: Sequence[int | None]) -> int:
+    return len({one for one in columns if one is not None})
+
+
+def _same(one: Any, other: Any) -> Any:
+    """Whether numbers differ by no more than the rounding of a description."""
+    return np.abs(one - other) <= 1e-13 * np.abs(other) + 1e-17

@@ -1,0 +1,131 @@
+"""What another fit tells of the measurements: mirrored axes and reversed loads that fitted parameters hide; and units of loads.
+
+A fit with a free base hides most of a mirrored axis, and a free stiffness loads of wrong sign or unit. So the fit is done again
+to the other numbers, and told by a chi-square test. With the sum of squares `S` of `n` numbers and `P` parameters,
+:math:`(n - P) (S - S') / S'` is the gain in variances.
+"""
+
+from __future__ import annotations
+
+import contextlib
+import math
+import re
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+from softrobots.core.errors import SoftRobotsError
+from softrobots.core.progress import with_progress
+from softrobots.identification.identification import Identification
+from softrobots.identification.identify import identify
+from softrobots.identification.measurements import Measurements
+from softrobots.identification.parameters import ParameterSet
+
+STEPS = 20
+"""Most steps of such a fit."""
+
+_SIGNIFICANT = 30.0  # gain in variances: 5 standard deviations and what six trials add
+_MIRRORED = {
+    "y, x, z": ((1, 0, 2), (1, 1, 1)),
+    "z, y, x": ((2, 1, 0), (1, 1, 1)),
+    "x, z, y": ((0, 2, 1), (1, 1, 1)),
+    "-x, y, z": ((0, 1, 2), (-1, 1, 1)),
+    "x, -y, z": ((0, 1, 2), (1, -1, 1)),
+    "x, y, -z": ((0, 1, 2), (1, 1, -1)),
+}
+"""Orders and signs of axes that no turn makes; each is its own inverse."""
+_LOADS = (
+    (1e3, 1.25, "g or mN", "kg or N"),
+    (1e3 / 9.80665, 1.25, "g", "N"),
+    (9.80665, 1.1, "N", "kg"),
+    (1.0 / 9.80665, 1.1, "kg", "N"),
+    (9.80665e-3, 1.25, "N", "g"),
+    (1e-3, 1.25, "kg or N", "g or mN"),
+)
+"""Ratios of numbers of loads in one unit to those in another that it is mistaken for, and how near a ratio is to be."""
+_TOLD = 0.2  # largest standard error of the logarithm of a stiffness that tells a unit
+_FORCES = ("force", "wrench")
+_OFF = math.log(2.0)  # change of a stiffness, as a logarithm, above which loads are doubted
+
+
+def other_axes(found: Identification, key: str, few: slice, progress: bool | str) -> list[str]:
+    """The swap of two axes, or the mirrored axis, of positions with which a fit with a free base leaves far less."""
+    if not key.startswith("positions.") or not any(name.startswith("base.rotation") for name in found.names):
+        return []
+    rows = found.fitted.measurements[few]
+    changes: dict[str, Any] = {
+        words: {"positions": {key.partition(".")[2]: rows.measured[key][:, order] * np.array(signs)}}
+        for words, (order, signs) in _MIRRORED.items()
+    }
+    return [
+        f"{key}: taking its x, y, z for {words}, and fitting again, leaves residuals of {size:.2g} of the size: are two axes "
+        "swapped, or is one mirrored?"
+        for words, size in _better(found, key, few, changes, progress)
+    ]
+
+
+def other_loads(found: Identification, key: str, few: slice, progress: bool | str) -> list[str]:
+    """The sign of gravity, or sign or unit of the other loads, with which a fit leaves far less."""
+    given = found.fitted.measurements[few].arguments()
+
+    def times(factor: float, *names: str) -> dict[str, Any]:
+        some = {name: given[name] for name in names if given.get(name) is not None}
+        scaled = {name: {key: factor * one for key, one in own.items()} for name, own in some.items() if isinstance(own, dict)}
+        return {name: factor * own for name, own in some.items() if name not in scaled} | scaled
+
+    changes = {"changing the sign of gravity": times(-1.0, "gravity"), "changing the sign of forces": times(-1.0, *_FORCES)}
+    for factor, _, wrong, right in _LOADS if rescaled(found) else ():
+        changes[f"dividing the loads by {factor:.4g} ({wrong} taken for {right})"] = times(1.0 / factor, *_FORCES, "mass")
+    return [
+        f"{key}: {words}, and fitting again, leaves residuals of {size:.2g} of the size: a load is what acts on the robot"
+        for words, size in _better(found, key, few, {words: one for words, one in changes.items() if one}, progress)
+    ]
+
+
+def load_units(found: Identification) -> list[str]:
+    """The units of loads that all fitted stiffnesses tell, which are as many times what they were taken for."""
+    known = dict(zip(found.names, found.by_rows.std <= _TOLD, strict=True))
+    ratios = {name: ratio for name, ratio in _stiffness_ratios(found).items() if known[name]}
+    loaded = any(np.any(values) for name, values in found.fitted.measurements.loads.items() if name != "gravity")
+    for factor, near, given, wanted in _LOADS if ratios and loaded else ():
+        if max(abs(math.log(ratio / factor)) for ratio in ratios.values()) < math.log(near):
+            size = math.exp(sum(map(math.log, ratios.values())) / len(ratios))
+            return [
+                f"{', '.join(ratios)}: {size:.4g} times what it was taken for, about {factor:.4g}, the ratio of {given} to "
+                f"{wanted}: are the loads in the right unit?"
+            ]
+    return []
+
+
+def rescaled(found: Identification) -> bool:
+    """Whether a fitted stiffness is far from what it was taken for, as one of a robot under wrong loads is."""
+    return any(abs(math.log(ratio)) > _OFF for ratio in _stiffness_ratios(found).values())
+
+
+def _stiffness_ratios(found: Identification) -> dict[str, float]:
+    """Fitted stiffnesses and moduli, over the means of their priors or, without, the values from which the fit started."""
+    taken = {one.name: found.priors.get(one.name, (one.value,))[0] for one in found.parameters if one.logarithmic}
+    named = {name: value for name, value in taken.items() if re.search("stiffness|modulus", name)}
+    return {name: found.values[name] / value for name, value in named.items() if min(value, found.values[name]) > 0.0}
+
+
+def _better(
+    found: Identification, key: str, few: slice, changes: Mapping[str, Mapping[str, Any]], progress: bool | str
+) -> Iterator[tuple[str, float]]:
+    """Yield the change of the measurements with which a fit leaves far less, if one does, and what it leaves, relative."""
+    rows, chosen = found.fitted.measurements[few], ParameterSet.of(found.model, found.names, found.fitted.measurements.markers)
+    own = float(np.nansum(found.residuals[key][few] ** 2))
+    freedoms = np.count_nonzero(np.isfinite(found.residuals[key][few])) - len(found.names)
+    start = ParameterSet.of(chosen.model([one.value for one in found.parameters]), found.names, rows.markers)
+    options: dict[str, Any] = {"priors": found.priors, "loss": found.loss, "max_iterations": STEPS}
+    left = dict[str, float]()
+    for words, change in with_progress(changes.items(), progress, label=f"other fits to {key}", unit="fit"):
+        given = rows.arguments()
+        given |= {name: given[name] | one if isinstance(one, dict) else one for name, one in change.items()}
+        with contextlib.suppress(SoftRobotsError):
+            fit = identify(start.present, Measurements(**given), start, **options)
+            left[words] = float(np.nansum(fit.residuals[key] ** 2))
+    words = min(left, key=left.__getitem__, default="")
+    if left and own > 2.0 * left[words] and freedoms * (own - left[words]) > _SIGNIFICANT * left[words]:
+        yield words, math.sqrt(left[words] / own)
