@@ -3,6 +3,7 @@
 import importlib
 from typing import TYPE_CHECKING, Any
 
+import softrobots.compiled.run.motion_batch
 import softrobots.dynamics.saved_motion
 import softrobots.identification.saved_identification
 import softrobots.statics.contact.saved_path  # noqa: F401  (adds the kinds of results that can be saved)

@@ -24,8 +24,8 @@ from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run import motion_runs
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.compiled_model import CompiledModel
+from softrobots.compiled.run.motion_batch import MotionBatch
 from softrobots.compiled.run.motion_cases import MotionCases
-from softrobots.compiled.run.results import MotionBatch
 from softrobots.core.errors import NotConverged, ParameterError
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement

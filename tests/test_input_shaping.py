@@ -12,8 +12,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
+from scipy.interpolate import CubicSpline
 
 import softrobots as sr
+from softrobots.dynamics.damping import damping_matrix
+from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.statics.kinematics import frame_placement
 from softrobots.view.figures import shapers
 from studies.control import shaping
 from studies.motion.examples import swing
@@ -221,3 +225,59 @@ def test_the_record_of_shapers_is_what_a_fresh_run_says() -> None:
     assert (tenth < 0.6).all()  # nearly linear, for each shaper
     assert (tenth < half).all()
     assert (half < whole).all()  # what is left is of second order in the move
+
+
+EFFECTS = {"weight": 0.16, "inertia": 0.55, "coupling": 2.52, "centrifugal": 3.21}
+"""Percent that ZV leaves of the move with one effect alone, as docs/motion.md tells."""
+
+
+@pytest.mark.study
+def test_what_shaping_leaves_comes_from_forces_of_second_order() -> None:
+    """Equations of motion by Runge and Kutta's method, with all effects but some kept as they are where the move ends.
+
+    With none ZV is exact; with all it leaves what the simulation leaves. Percentages are those of the page, to its digits.
+    """
+    arm, (begin, end) = sr.load_model(sr.InflatableArm()), np.array((shaping.FROM, shaping.TO))
+    sagging = sr.solve_equilibrium(arm, end, gravity=sr.EARTH_GRAVITY)
+    bare = shaping.point_to_point(begin, end, shaping.DURATION, 201)
+    found = sr.vibration_modes(arm, sagging)
+    zv, none = (sr.shape_input(bare, found, shaper="zv", numbers=numbers) for numbers in ((0, 1), ()))
+    for effects, percent in [((name,), left) for name, left in EFFECTS.items()] + [((), 0.0), (tuple(EFFECTS), 3.94)]:
+        shaped, whole = (_left(arm, begin, sagging, move, effects) for move in (zv, none))
+        assert 100.0 * shaped / whole == pytest.approx(percent, abs=0.05), effects
+
+
+def _left(arm: sr.SoftModel, begin: Any, sagging: sr.Equilibrium, move: sr.ShapedTrajectory, effects: tuple[str, ...]) -> float:
+    """Largest distance of the tip from its place at rest in the 0.4 s after a move [m]."""
+    equations = EquationsOfMotion(arm, sr.EARTH_GRAVITY, damping_matrix(arm, None))
+    still, end, rest = np.zeros(7), sagging.q_motors, sagging.q_springs
+    at_end, damping = equations.mass_matrix(np.append(end, rest)), equations.damping[3:, 3:]
+
+    def static(x: Any) -> Any:
+        return equations.balance(x, still, still, {})[3:]
+
+    steps = 1e-5 * np.eye(7)
+    slope = np.array([static(np.append(end, rest) + d) - static(np.append(end, rest) - d) for d in steps]).T / 2e-5
+    duration, times = float(move.times[-1]), np.linspace(0.0, float(move.times[-1]), 2001)
+    path = CubicSpline(times, [move(time) for time in times], bc_type="clamped")
+    speed, acceleration = path.derivative(1), path.derivative(2)
+
+    def rates(time: float, state: Any) -> Any:
+        x, on = np.append(path(min(time, duration)), state[:4]), time < duration
+        v = np.append(on * speed(min(time, duration)), state[4:])
+        mass = equations.mass_matrix(x)
+        moved = (mass if "inertia" in effects else at_end)[3:, 3:]
+        pushed = (mass if "coupling" in effects else at_end)[3:, :3] @ (on * acceleration(min(time, duration)))
+        force = static(x) if "weight" in effects else slope @ (x - np.append(end, rest))
+        force += equations.balance(x, v, still, {})[3:] - static(x) if "centrifugal" in effects else damping @ state[4:]
+        return np.append(state[4:], -np.linalg.solve(moved, force + pushed))
+
+    first = rest - np.linalg.solve(slope[:, 3:], slope[:, :3] @ (begin - end))
+    if "weight" in effects:
+        first = sr.solve_equilibrium(arm, begin, gravity=sr.EARTH_GRAVITY).q_springs
+    run = solve_ivp(
+        rates, (0.0, duration + 0.4), np.append(first, np.zeros(4)), rtol=1e-6, atol=1e-8, max_step=0.01, dense_output=True
+    )
+    after = run.sol(np.linspace(duration, duration + 0.4, 201))[:4].T
+    tips = [frame_placement(arm, arm.configuration(end, y), arm.tip).translation for y in after]
+    return float(np.linalg.norm(tips - sagging.tip_position, axis=1).max())

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 from scipy.integrate import solve_ivp
 
@@ -184,6 +184,7 @@ def test_given_steps_are_of_second_order_through_jumps_between_them() -> None:
         assert np.log2(np.divide(errors[:-1], errors[1:])) == pytest.approx(2.0, abs=0.1)
 
 
+@example(groups=[[0.5, 0.25]], apart=0.3)  # the earlier one is too near to zero
 @given(
     groups=st.lists(st.lists(st.floats(-0.1, 2.1), max_size=8), min_size=1, max_size=3),
     apart=st.sampled_from([1e-9, 1e-2, 0.3]),

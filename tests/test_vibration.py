@@ -72,6 +72,56 @@ def test_a_clamped_rod_rings_at_its_closed_form_frequencies(chain: str, largest:
     assert errors[0] / errors[1] > 2.0
 
 
+def ritz_errors(count: int, mean: str) -> np.ndarray:
+    """Errors of the first three frequencies of a clamped rod whose curvature is constant in each of `count` equal sections.
+
+    Ritz's method: its mass is on the arcs, by Gauss points, or on the chords between their ends.
+    """
+    points, weights = np.polynomial.legendre.leggauss(4)
+    start, share = np.arange(count)[:, None], 0.5 + 0.5 * points
+    s = (start + share)[:, :, None] - np.arange(count)  # along the rod from the start of each section, in lengths of a section
+    aside = np.where(s > 1.0, s - 0.5, 0.5 * np.maximum(s, 0.0) ** 2)  # by a unit of curvature of each
+    if mean == "chords":
+        ends = np.where(start > np.arange(count), start - np.arange(count) - 0.5, 0.0)
+        ends = np.vstack([ends, count - np.arange(count) - 0.5])
+        aside = ends[:-1, None] * (1.0 - share)[:, None] + ends[1:, None] * share[:, None]
+    mass = np.einsum("ipj,p,ipk->jk", aside, 0.5 * weights, aside)
+    found = np.sort(np.linalg.eigvals(mass).real)[::-1][:3] ** -0.5 * count**2
+    return found / cantilever_frequencies(0.0) - 1.0
+
+
+def test_sections_ring_as_a_rod_of_constant_curvatures_with_its_mass_on_chords() -> None:
+    """The errors that docs/motion.md tells are of piecewise constant curvature; mass on the arcs would halve two of them."""
+    robot = rod(16, "sections")
+    found = sr.vibration_modes(robot, sr.solve_equilibrium(robot, ())).frequencies[:6:2] / rod_frequencies(0.0) - 1.0
+    assert found == pytest.approx(ritz_errors(16, "chords"), abs=5e-5)  # of tiny links on the joints, and of rotary inertia
+    assert ritz_errors(16, "chords") == pytest.approx([0.0005, 0.0097, 0.0280], abs=5e-5)
+    assert ritz_errors(16, "arcs") == pytest.approx([0.0008, 0.0053, 0.0127], abs=5e-5)
+
+
+@pytest.mark.parametrize("count", [1, 4])
+def test_a_rod_of_sections_sags_exactly_under_a_small_weight(count: int) -> None:
+    """The reason for its mass on chords: `w l^4 / 8 EI` at the tip, however few sections there are; 1 / 3 n^2 less on arcs."""
+    robot, gravity = rod(count, "sections"), 1e-3
+    tip = sr.solve_equilibrium(robot, (), gravity=(gravity, 0.0, 0.0)).tip_position
+    sag = DENSITY * gravity * LENGTH**4 / (8.0 * BENDING)
+    assert tip[0] == pytest.approx(sag, rel=2e-3 / count)  # links of 1e-4 kg on the joints
+
+
+def test_twist_and_stretch_of_sections_are_of_second_order() -> None:
+    """First frequencies in closed form, `sqrt(GJ / J) / 4 l` and `sqrt(EA / m) / 4 l`."""
+    inertia = DENSITY * 1e-3**2 / 2.0
+    exact = np.sqrt([0.5 / inertia, 1e5 / DENSITY]) / (4.0 * LENGTH)
+    errors = []
+    for count in (4, 8):
+        robot = rod(count, "sections")
+        modes = sr.vibration_modes(robot, sr.solve_equilibrium(robot, ()))
+        found = [modes.frequencies[modes.effective_masses[:, axis].argmax()] for axis in (5, 2)]
+        errors.append(np.abs(found / exact - 1.0))
+    assert np.all(errors[1] < 2e-3)  # pi^2 / 96 n^2 of a sum instead of an integral
+    assert np.all((errors[0] / errors[1] > 3.7) & (errors[0] / errors[1] < 4.3)), errors
+
+
 def test_modes_of_a_round_rod_come_in_pairs_along_its_axes() -> None:
     robot = rod(6, "sections")
     modes = sr.vibration_modes(robot, sr.solve_equilibrium(robot, (), gravity=sr.EARTH_GRAVITY))

@@ -29,7 +29,7 @@ from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.reports.motion_report import motion_answer
 from softrobots.core.checks import FloatArray, finite_array, positive_number
 from softrobots.core.csv_table import Table, read_table
-from softrobots.core.errors import FileFormatError, ParameterError
+from softrobots.core.errors import FileFormatError, NotConverged, ParameterError
 from softrobots.core.files import new_file
 from softrobots.core.result_file import load_result
 from softrobots.core.summary import text_of
@@ -65,7 +65,7 @@ def add_parser(subparsers: Any) -> None:
         help="simulate the motion of a robot",
         description="Simulate how a robot moves and rings under prescribed motors, loads and gravity, with steps chosen so "
         "that the tip is right within a tolerance. Exit status 0 if the whole motion is found, 1 if not, 2 after bad input, "
-        "130 after Ctrl-C, which writes what there is.",
+        "130 after Ctrl-C; what there is of a motion is written in any case.",
         epilog=_EXAMPLES,
     )
     add_model(parser)
@@ -89,6 +89,11 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--release", "FX FY FZ", help_text)
     add_damping(parser)
     add_numbers(parser, "--time-step", "T", "fixed steps of this length [s] (steps chosen for the tolerance)")
+    help_text = (
+        "order of the error in the length of the steps: 4 where motors and loads stand still (2 with --time-step, where they "
+        "move, where springs have plateaus and with dry friction, else 4)"
+    )
+    parser.add_argument("--order", type=int, choices=(2, 4), help=help_text)
     add_numbers(parser, "--tolerance", "D", "largest error of the tip [m] (5e-4 of the reach); not with --time-step")
     add_numbers(parser, "--output-step", "T", "time between two rows of the result [s] (a 200th of the duration)")
     add_output(parser, "the motion", ROS_FORMS)
@@ -111,21 +116,26 @@ def run(arguments: argparse.Namespace) -> None:
     motors, duration = _motors(arguments, model)
     table = arguments.force_table
     gust = None if table is None else _columns(read_table(table, ("t", "fx", "fy", "fz")))
-    motion = simulate(
-        model,
-        duration,
-        motors,
-        start=_start(arguments, model, motors, duration, gust, load),
-        force=gust,
-        wrench=dict(load.wrenches),
-        gravity=load.gravity,
-        damping_time=arguments.damping_time,
-        mass_damping=arguments.mass_damping,
-        time_step=arguments.time_step,
-        tolerance=arguments.tolerance,
-        output_step=arguments.output_step,
-        progress=True,
-    )
+    start, failure = _start(arguments, model, motors, duration, gust, load), None
+    try:
+        motion = simulate(
+            model,
+            duration,
+            motors,
+            start=start,
+            force=gust,
+            wrench=dict(load.wrenches),
+            gravity=load.gravity,
+            damping_time=arguments.damping_time,
+            mass_damping=arguments.mass_damping,
+            time_step=arguments.time_step,
+            tolerance=arguments.tolerance,
+            output_step=arguments.output_step,
+            order=arguments.order,
+            progress=True,
+        )
+    except NotConverged as error:
+        motion, failure = error.best, error
     files = save(arguments, motion)
     for option, draw in _PICTURES.items():
         files += write_plot(arguments, partial(draw, motion), option)
@@ -135,6 +145,8 @@ def run(arguments: argparse.Namespace) -> None:
             files.append(viewer.write_html(arguments.page, title=str(model.pinocchio.name), overwrite=arguments.overwrite))
     lines = text_of([loaded_robot(model, load), *motion.summary_parts()[1:]], None)
     print_answer(arguments, motion_answer(motion, load), lines, files)
+    if failure is not None:
+        raise failure
     if motion.interrupted:
         raise KeyboardInterrupt
 

@@ -89,7 +89,8 @@ class NotConverged(SoftRobotsError, RuntimeError):
     """An iteration that did not converge.
 
     Attributes:
-        best: The best iterate: an `Equilibrium`, `LoadEstimate` or `IkSolution` that does not meet the tolerance.
+        best: The best iterate: an `Equilibrium`, `LoadEstimate` or `IkSolution` that does not meet the tolerance, or what there
+            is of a `Motion` or a batch.
         residual: Its residual, in the unit given in the message.
         iterations: Number of iterations.
     """

@@ -56,6 +56,8 @@ class LinearModel(Summarised):
     `<motor>_rate`."""
     output_units: tuple[str, ...]
     """Unit of each."""
+    settings: dict[str, Any]
+    """The arguments `damping_time`, `mass_damping` and `rotor_inertia`."""
 
     def summary_parts(self) -> list[Part]:
         """Return how the motors are driven, then states, inputs and outputs with their units."""
@@ -163,6 +165,7 @@ def linearize(
         input_units=(*motor_input_units, *given, *("N" for _ in "xyz")),
         output_names=(*_TIP, *motor_outputs),
         output_units=(*_TIP_UNITS, *motor_output_units),
+        settings={"damping_time": damping_time, "mass_damping": mass_damping, "rotor_inertia": rotor_inertia},
     )
 
 

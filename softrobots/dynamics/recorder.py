@@ -27,6 +27,7 @@ class Recorder:
         self.state = start
         """The state reached."""
         self._x, self._rates = np.zeros((len(rows), len(start.x))), np.zeros((len(rows), len(start.x)))
+        self._forces = rule.load.tip_forces(rows) if rule.load.constant else np.zeros((len(rows), 3))
         self.rows = 0
         """Number of rows so far."""
         self._most_rows = 0
@@ -65,6 +66,8 @@ class Recorder:
                 x[prescribed] = self.rule.path(time)[prescribed]
                 rates[prescribed] = (middle.rates + (time - middle.time) * step.accelerations)[prescribed]
             self._x[row], self._rates[row] = x, rates
+            if not self.rule.load.constant:
+                self._forces[row] = self.rule.load.tip_forces(self._times[row : row + 1])[0]
             if self.rule.torque is not None:
                 self._motor_torques[row] = self.rule.torque.exerted(time, x, rates)
         if last > self.rows:
@@ -121,7 +124,7 @@ class Recorder:
             q_springs=read_only(np.array(x[:, m:])),
             velocities=read_only(np.array(rates[:, m:])),
             motor_torques=read_only(-exerted),
-            forces=read_only(self.rule.load.tip_forces(times)),
+            forces=read_only(self._forces[:n].copy()),
             gravity=equations.gravity,
             energy=MotionEnergy(*columns),
             steps=read_only(np.array(self.times)),

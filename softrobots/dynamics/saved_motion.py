@@ -1,7 +1,7 @@
-"""Serialisation of motions and of vibration modes: named arrays for result files, and columns of CSV tables with their units.
+"""Serialisation of motions, modes and linear models: named arrays for result files, and columns of CSV tables with their units.
 
 A file of a motion holds the robot (URDF and springs), coordinates, velocities, loads and energies over time. Poses are computed
-again. One of modes holds the equilibrium and the arguments; the modes are computed again and compared.
+again. One of modes or of a linear model holds the equilibrium and the arguments; the rest is computed again and compared.
 """
 
 from __future__ import annotations
@@ -14,12 +14,14 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, finite_number, increasing, read_only
 from softrobots.core.errors import FileFormatError
-from softrobots.core.result_file import KINDS, Kind, named_columns, vector_columns
+from softrobots.core.result_file import KINDS, Kind, named_columns, text, vector_columns
+from softrobots.dynamics.linear_model import LinearModel, linearize
 from softrobots.dynamics.motion import Motion, MotionEnergy
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.model.actuators import load_units
 from softrobots.model.friction_coordinates import packed_memories, with_memories
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
 from softrobots.statics.saved_results import pack_model, unpack_model
 from softrobots.statics.tables.columns import joint_columns
@@ -86,15 +88,23 @@ def _table(motion: Motion) -> dict[str, FloatArray]:
 KINDS["motion"] = Kind(Motion, _pack, _unpack, many=True, to_table=_table)
 
 
+def _pack_asked(result: VibrationModes | LinearModel) -> dict[str, Any]:
+    settings = {name: value for name, value in result.settings.items() if value is not None}
+    return KINDS["equilibrium"].to_arrays(result.equilibrium) | settings
+
+
+def _unpack_asked(fields: Mapping[str, Any], *names: str) -> tuple[Equilibrium, dict[str, Any]]:
+    return KINDS["equilibrium"].from_arrays(fields), {
+        name: finite_array(name, fields[name], None) for name in names if name in fields
+    }
+
+
 def _pack_modes(modes: VibrationModes) -> dict[str, Any]:
-    settings = {name: value for name, value in modes.settings.items() if value is not None}
-    return KINDS["equilibrium"].to_arrays(modes.equilibrium) | settings | {"frequencies": modes.frequencies}
+    return _pack_asked(modes) | {"frequencies": modes.frequencies}
 
 
 def _unpack_modes(fields: Mapping[str, Any]) -> VibrationModes:
-    equilibrium = KINDS["equilibrium"].from_arrays(fields)
-    names = ("damping_time", "mass_damping", "servo_stiffness", "rotor_inertia")
-    settings: dict[str, Any] = {name: finite_array(name, fields[name], None) for name in names if name in fields}
+    equilibrium, settings = _unpack_asked(fields, "damping_time", "mass_damping", "servo_stiffness", "rotor_inertia")
     modes = vibration_modes(equilibrium.model, equilibrium, **settings)
     claimed = finite_array("frequencies", fields["frequencies"], modes.frequencies.shape, "Hz")
     if not np.allclose(claimed, modes.frequencies, rtol=_SAME, atol=0.0):
@@ -122,3 +132,20 @@ def _table_of_modes(modes: VibrationModes) -> dict[str, FloatArray]:
 
 
 KINDS["vibration_modes"] = Kind(VibrationModes, _pack_modes, _unpack_modes, to_table=_table_of_modes)
+
+
+def _pack_linear(linear: LinearModel) -> dict[str, Any]:
+    return _pack_asked(linear) | {"motors": linear.motors} | dict(zip("ABCD", linear, strict=True))
+
+
+def _unpack_linear(fields: Mapping[str, Any]) -> LinearModel:
+    equilibrium, settings = _unpack_asked(fields, "damping_time", "mass_damping", "rotor_inertia")
+    linear = linearize(equilibrium.model, equilibrium, motors=text(fields, "motors"), **settings)
+    for name, found in zip("ABCD", linear, strict=True):
+        claimed = finite_array(name, fields[name], found.shape)
+        if np.abs(claimed - found).max(initial=0.0) > _SAME * np.abs(found).max(initial=0.0):
+            raise FileFormatError(f"its matrix {name} is not that of its equilibrium")
+    return linear
+
+
+KINDS["linear_model"] = Kind(LinearModel, _pack_linear, _unpack_linear)

@@ -28,6 +28,7 @@ from softrobots.dynamics.step_control import (
     halved,
     order_of_steps,
     rule_of_order,
+    stopped_at,
     tip_distances,
 )
 from softrobots.dynamics.time_grid import SAME_TIME, grid_of_rows, grid_with_stops, merged_times, steps_and_rows
@@ -100,8 +101,8 @@ def simulate(
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range.
         NameNotFound: If a frame does not exist.
-        NotConverged: If no step from a state succeeds, however short, or the tolerance cannot be met; `best` is the motion that
-            was reached.
+        NotConverged: If no step from a state succeeds, however short, a function fails after the first step or returns what it
+            must not, or the tolerance cannot be met; `best` is the motion that was reached.
     """
     check_model(model)
     end = positive_number("duration", duration, "s")
@@ -143,7 +144,7 @@ def simulate(
 def _fixed(run: Recorder, grid: FloatArray, damping_time: float | None, progress: bool | str) -> Motion:
     """Motion with given steps."""
     try:
-        _take(run, follow(run, grid), damping_time, progress, "motion")
+        _take(run, follow(run, grid), {"damping_time": damping_time}, progress, "motion")
         return run.motion(damping_time=damping_time)
     except KeyboardInterrupt:
         return run.motion(damping_time=damping_time, interrupted=True)
@@ -158,11 +159,11 @@ def _controlled(
     order = run.rule.order
     try:
         first = choose(run, stops, tolerance) if order == MidpointRule.order else follow(run, stops)
-        _take(run, first, damping_time, progress, "motion")
+        _take(run, first, facts, progress, "motion")
         while True:
             finer = new_run()
             grid = halved(np.array(run.times))
-            _take(finer, follow(finer, grid), damping_time, progress, f"motion, {len(grid) - 1} steps")
+            _take(finer, follow(finer, grid), facts | {"tip_error": None}, progress, f"motion, {len(grid) - 1} steps")
             errors = tip_distances(run, finer)
             before, last = last, float(errors.max())
             errors *= error_share(before, last, order)
@@ -190,15 +191,21 @@ def _controlled(
         return run.motion(**facts, interrupted=True)
 
 
-def _take(run: Recorder, steps: Iterable[int], damping_time: float | None, progress: bool | str, label: str) -> None:
-    """Take all steps of a run.
+def _take(run: Recorder, steps: Iterable[int], facts: dict[str, Any], progress: bool | str, label: str) -> None:
+    """Take all steps of a run, whose motion has other fields `facts`.
 
     Raises:
-        NotConverged: If no step from a state succeeds; `best` is the motion up to there.
+        NotConverged: If no step from a state succeeds, or a function of the caller fails after the first one; `best` is the
+            motion up to there.
     """
     try:
         for _ in with_progress(steps, progress, label=label, unit="row", total=run.count):
             pass
-    except NoStep as error:
-        best = run.motion(damping_time=damping_time)
-        raise NotConverged(str(error), best=best, residual=math.inf, iterations=len(run.times) - 1) from None
+    except Exception as error:  # of a controller, a load or a path: anything
+        count = len(run.times) - 1
+        if count == 0 and not isinstance(error, NoStep):
+            raise
+        cause = None if isinstance(error, NoStep) else error
+        why = stopped_at(run.state.time, run.duration, cause) if cause else str(error)
+        why += "; `best` is the motion until there"
+        raise NotConverged(why, best=run.motion(**facts), residual=math.inf, iterations=count) from cause

@@ -32,14 +32,7 @@ def first_state(model: SoftModel, start: Any, path: MotorPath, free: int = 0) ->
             start = start.end
         if not isinstance(start, Equilibrium | MotionState):
             raise ParameterError("start", start, "an Equilibrium, a Motion, a MotionState, or None (relaxed, at rest)")
-        if isinstance(start, Equilibrium):
-            check_no_contact(start, "a simulation (export the robot with its obstacles to MuJoCo or Drake)")
-        if start.model != model:
-            raise ParameterError("start", start.model, f"a state of the model given, {model!r}")
-        apart = np.abs(motors - start.q_motors)[free : model.actuators.n_placed].max(initial=0.0)
-        if apart > _APART:
-            text = f"at {start.q_motors.tolist()} at t = 0, where `start` has the actuators (it is {apart:.3g} rad or m away)"
-            raise ParameterError("q_motors", motors, text)
+        check_start(model, start, motors, free)
         before = start.model if isinstance(start, MotionState) else after_step(start.model, start.q_motors, start.q_springs)
         springs, motors = start.q_springs, np.concatenate([start.q_motors[:free], motors[free:]])
         if isinstance(start, MotionState):
@@ -47,6 +40,23 @@ def first_state(model: SoftModel, start: Any, path: MotorPath, free: int = 0) ->
             rates[model.n_motors :] = start.velocities
     memory = None if model.structure.friction is None else memory_of(before)
     return State(0.0, np.concatenate([motors, springs]), rates, memory)
+
+
+def check_start(model: SoftModel, start: Equilibrium | MotionState, motors: FloatArray, free: int = 0) -> None:
+    """Check that a motion can start where the motors are at time zero, shape (n_motors,), or (n, n_motors) of several motions.
+
+    Raises:
+        ParameterError: If the start is of another robot, has obstacles, or has actuators but the first `free` elsewhere.
+    """
+    if isinstance(start, Equilibrium):
+        check_no_contact(start, "a simulation (export the robot with its obstacles to MuJoCo or Drake)")
+    if start.model != model:
+        raise ParameterError("start", start.model, f"a state of the model given, {model!r}")
+    distances = np.abs(motors - start.q_motors)[..., free : model.actuators.n_placed]
+    apart = np.fmax.reduce(distances, axis=None, initial=0.0)
+    if apart > _APART:
+        text = f"at {start.q_motors.tolist()} at t = 0, where `start` has the actuators (it is {apart:.3g} rad or m away)"
+        raise ParameterError("q_motors", motors, text)
 
 
 def first_kick(path: MotorPath, rates: FloatArray) -> FloatArray | None:

@@ -49,6 +49,12 @@ class NoStep(SoftRobotsError):
     """No step from a state succeeds, however short."""
 
 
+def stopped_at(time: float, duration: float, error: Exception) -> str:
+    """Say that a function of the caller ended a motion, at which time [s], and why."""
+    why = error if isinstance(error, SoftRobotsError) else f"{type(error).__name__}: {error}"
+    return f"the motion ends at t = {time:.6g} s of {duration:.6g} s: {why}"
+
+
 def follow(recorder: Recorder, grid: FloatArray) -> Iterator[int]:
     """Step through a grid of times; yield once for each row of the output.
 
@@ -120,7 +126,7 @@ def order_of_steps(order: Any, time_step: float | None, model: SoftModel, still:
     if order is None:
         smooth = still and model.structure.friction is None and len(model.springs.beyond_plateaus(model.rest)) == 0
         return GaussRule.order if smooth and time_step is None else MidpointRule.order
-    if order not in (GaussRule.order, MidpointRule.order) or isinstance(order, bool):
+    if isinstance(order, bool) or np.ndim(order) or order not in (GaussRule.order, MidpointRule.order):
         raise ParameterError("order", order, "2, 4 or None")
     if order == GaussRule.order and model.structure.friction is not None:
         raise ParameterError("order", order, "2 or None of a robot with dry friction")
@@ -155,6 +161,7 @@ def tip_distances(coarse: Recorder, fine: Recorder) -> FloatArray:
 def _advance(recorder: Recorder, end: float, *, to_knees: bool = False) -> Iterator[int]:
     """Take a step to a time, or several shorter ones if it fails; or to the first knee before that time."""
     targets = [end]
+    shortest = max((end - recorder.state.time) * 0.5**_HALVINGS, 4.0 * math.ulp(end))  # down to where times differ
     while targets:
         step = recorder.rule.step(recorder.state, targets[-1])
         knee = _first_knee(recorder, step) if to_knees and step is not None else None
@@ -163,8 +170,7 @@ def _advance(recorder: Recorder, end: float, *, to_knees: bool = False) -> Itera
             targets.pop()
             if step.end.time in recorder.rule.path.kicks and step.end.time < recorder.duration:
                 recorder.kick(recorder.rule.path.kicks[step.end.time])
-        elif len(targets) > _HALVINGS:
-            now = recorder.state.time
+        elif targets[-1] - (now := recorder.state.time) <= shortest:
             raise NoStep(
                 f"no step from t = {now:.6g} s succeeds, down to a length of {targets[-1] - now:.3g} s" + _range_end(recorder)
             )

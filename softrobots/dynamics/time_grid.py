@@ -62,8 +62,8 @@ def merged_times(apart: float, end: float, *groups: FloatArray) -> FloatArray:
     for group in groups:
         times = np.unique(group[(group > 0.0) & (group < end)])
         places = np.searchsorted(found, times)
-        alone = np.minimum(times - found[places - 1], found[places] - times) > apart
-        times = times[alone & (np.diff(times, prepend=-np.inf) > apart)]
+        times = times[np.minimum(times - found[places - 1], found[places] - times) > apart]
+        times = times[np.diff(times, prepend=-np.inf) > apart]
         found = np.insert(found, np.searchsorted(found, times), times)
     return found
 

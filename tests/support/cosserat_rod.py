@@ -168,7 +168,7 @@ class CosseratRod(RoundRod):
     ) -> np.ndarray:  # fmt: skip
         """States at some times, shape (n, 13 cells), from a state at time 0; the tolerance is relative to the length.
 
-        The wrench may be a function of time. An explicit method for undamped rods, `BDF` for damped ones, which are stiff.
+        The wrench may be a function of time. `Radau` or `DOP853` for undamped rods, `BDF` for damped ones, which are stiff.
         """
         load = wrench if callable(wrench) else lambda t: wrench
         slopes: dict[str, Any] = {} if method == "DOP853" else {"jac": lambda t, y: self.slopes(y, load(t), drag)}

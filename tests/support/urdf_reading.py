@@ -58,7 +58,8 @@ def link_masses(urdf: str, values: Mapping[str, float]) -> Mass:
             continue
         xx, xy, xz, yy, yz, zz = (float(inertial.find("inertia").get(f"i{key}")) for key in TENSOR)
         place = pose @ [*numbers(inertial.find("origin").get("xyz")), 1.0]
-        tensor = pose[:3, :3] @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ pose[:3, :3].T
+        axes = pose[:3, :3] @ Rotation.from_euler("xyz", numbers(inertial.find("origin").get("rpy"))).as_matrix()
+        tensor = axes @ np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]) @ axes.T
         bodies.append((float(inertial.find("mass").get("value")), place[:3], tensor))
     return together(bodies)
 

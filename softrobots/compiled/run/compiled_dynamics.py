@@ -13,12 +13,12 @@ from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
+from softrobots.compiled.run.motion_batch import MotionBatch
 from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks
 from softrobots.compiled.run.motion_damping import MotionDamping
-from softrobots.compiled.run.motion_results import CompiledMotion, StepEnd
+from softrobots.compiled.run.motion_results import CompiledMotion, StepEnd, check_batch, check_motion
 from softrobots.compiled.run.motion_runs import StepsTaken, first_grid, halve_to_tolerance, replay, take_batch, take_one
-from softrobots.compiled.run.results import MotionBatch
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
 from softrobots.core.errors import NotConverged
@@ -59,6 +59,7 @@ class CompiledDynamics(CompiledStatics):
         output_step: Any = None,
         tolerance: Any = None,
         order: Any = None,
+        progress: bool | str = False,
     ) -> Motion:
         """Simulate the motion of the robot as `softrobots.simulate` does, with the same answer at the same steps.
 
@@ -74,13 +75,16 @@ class CompiledDynamics(CompiledStatics):
             output_step: Time between two rows of the result [s]; by default 200 rows, or fewer with given steps.
             tolerance: Largest error of the tip [m], measured with steps twice as long; by default 5e-4 of the reach.
             order: Order of the error in the length of the steps, 2 or 4, as in `softrobots.simulate`.
+            progress: Show a progress bar of parts of 2000 steps on stderr; a text is its label.
 
         Returns:
-            The motion; its torques and energies are computed when they are first asked for, by Pinocchio.
+            The motion; its torques and energies are computed when they are first asked for, by Pinocchio. Ctrl-C ends it early
+            with what there is (`Motion.interrupted`).
 
         Raises:
             ParameterError: If an argument has the wrong shape, is not finite or out of range, or its actuators are refused.
-            NotConverged: If a step fails, however short, or the tolerance is not met; `best` is the motion so far.
+            NotConverged: If a step fails, however short, a function fails after the first step or returns what it must not, or
+                the tolerance is not met; `best` is the motion so far.
         """
         end = positive_number("duration", duration, "s")
         path, load = MotorPath(self._model, q_motors, end), TimeLoad(self._model, force, None, end)
@@ -97,18 +101,22 @@ class CompiledDynamics(CompiledStatics):
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
         def take(grid: FloatArray) -> StepsTaken:
-            return take_one(run, state, given, course, grid, times)
+            return take_one(run, state, given, course, grid, times, progress)
 
         if h is not None:
             taken = take(grid_with_stops(end, h, *course.breaks))
         else:
             taken = halve_to_tolerance(take, first_grid(rows, course.breaks, scheme), largest, scheme)
-            facts["tip_error"] = None if taken.errors is None else float(taken.errors[0])
+            facts["tip_error"] = None if taken.errors is None or taken.status[0] else float(taken.errors[0])
         at_rows = taken if times is rows else replace(taken, rows=taken.rows[:, np.searchsorted(times, rows)])
         down = None if gravity is None else tuple(gravity_vector(gravity).tolist())
 
         def again(steps: FloatArray, row_times: FloatArray) -> Motion:
             ends = take_one(run, state, given, course, steps, steps)
+            if ends.interrupted:
+                raise KeyboardInterrupt
+            if ends.failure is not None:
+                raise ends.failure[1]
             ends = replace(ends, rows=np.concatenate(self._elastic_state(ends.rows[..., :-3]), axis=-1))
             return replay(EquationsOfMotion(self._model, down, damping), course, ends, row_times, facts, scheme)
 
@@ -118,20 +126,8 @@ class CompiledDynamics(CompiledStatics):
         if path.constant and len(found) == len(rows):
             known["tip_position"] = np.ascontiguousarray(found[:, -3:])
         motion = CompiledMotion(again, model=self._model, q_springs=springs, velocities=rates, **known)
-        if taken.interrupted or (taken.status[0] == Status.CERTIFIED and taken.is_within):
-            return motion
-        why = f"no step from t = {motion.time[-1]:.6g} s succeeds, however short"
-        if taken.status[0] == Status.CERTIFIED:
-            why = (
-                f"the tip is known to {motion.tip_error:.3g} m, required {largest:.3g} m, with {len(taken.grid) - 1} steps; a "
-                "shorter duration, a larger tolerance or more damping may help, or a given time_step"
-            )
-        raise NotConverged(
-            why,
-            best=motion,
-            residual=math.inf if motion.tip_error is None else motion.tip_error,
-            iterations=len(taken.grid) - 1,
-        )
+        check_motion(motion, taken, end)
+        return motion
 
     def step(
         self,
@@ -206,6 +202,7 @@ class CompiledDynamics(CompiledStatics):
         tolerance: Any = None,
         order: Any = None,
         threads: int = 1,
+        progress: bool | str = False,
     ) -> MotionBatch:
         """Simulate many cases side by side, all with the same steps.
 
@@ -214,7 +211,8 @@ class CompiledDynamics(CompiledStatics):
             q_motors: Actuators that stand still, shape (n, n_motors), or (n_motors,) for all cases [rad, m or N]; a
                 `Trajectory` or a function of time for all cases; or a list of those.
             starts: Elastic coordinates at rest, shape (n, n_springs) or (n_springs,) [rad or m]; a pair of those and their
-                rates; a `MotionBatch`, whose last rows are taken, or an `EquilibriumBatch`; by default relaxed springs.
+                rates; an `Equilibrium` for all cases; a `MotionBatch`, whose last rows are taken, or an `EquilibriumBatch`; by
+                default relaxed springs.
             forces: Force on the tip, shape (n, 3), or (3,) for all cases [N], world axes; a table or a function of time for all
                 cases; or a list of those.
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
@@ -225,13 +223,16 @@ class CompiledDynamics(CompiledStatics):
             tolerance: Largest error of the tip in a row [m], measured with steps twice as long; by default 5e-4 of the reach.
             order: Order of the error in the length of the steps, 2 or 4, as in `softrobots.simulate`.
             threads: Number of threads; more than one speeds up numba only.
+            progress: Show a progress bar of blocks of cases on stderr; a text is its label.
 
         Returns:
-            One motion a case. The status tells which cases failed; a failed case does not affect others.
+            One motion a case. The status tells which cases failed; a failed case does not affect others. Ctrl-C ends it early
+            with the cases that are done (`MotionBatch.interrupted`).
 
         Raises:
             ParameterError: If an argument has the wrong shape or is out of range, or its actuators are refused.
-            NotConverged: If the tolerance is not met; `best` is the batch so far.
+            NotConverged: If the tolerance is not met, or the function of a case fails on the way, when the others are done;
+                `best` is the batch.
         """
         end = positive_number("duration", duration, "s")
         positive_integer("threads", threads)
@@ -246,7 +247,7 @@ class CompiledDynamics(CompiledStatics):
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
         def take(grid: FloatArray) -> StepsTaken:
-            return take_batch(run, values, cases, spring_kicks, grid, times, threads)
+            return take_batch(run, values, cases, spring_kicks, grid, times, threads, progress)
 
         if h is not None:
             few = sum(map(len, cases.breaks)) <= MOST_KINKS
@@ -258,14 +259,7 @@ class CompiledDynamics(CompiledStatics):
         tips, asked = np.ascontiguousarray(found[..., -3:]), None if h is not None else largest
         springs, rates = self._elastic_state(found[..., :-3])
         batch = MotionBatch(rows, springs, rates, tips, taken.status, taken.grid, taken.errors, asked, taken.interrupted)
-        if not taken.is_within:
-            raise NotConverged(
-                f"the tips are not known to {largest:.3g} m after a run with {len(taken.grid) - 1} steps; a shorter duration "
-                "or more damping may help, or a time_step",
-                best=batch,
-                residual=math.inf if taken.errors is None else float(taken.errors.max(initial=0.0)),
-                iterations=len(taken.grid) - 1,
-            )
+        check_batch(batch, taken, cases.failures)
         return batch
 
     def _motion_code(self, gravity: Any, damping_time: Any, mass_damping: Any, order: int) -> tuple[Any, Any, FloatArray]:

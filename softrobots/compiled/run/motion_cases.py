@@ -2,18 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.batches import batch_rows, unusable, without
+from softrobots.compiled.run.motion_batch import MotionBatch
 from softrobots.compiled.run.motion_course import SpringKicks, forces_of_steps, motors_of_steps
-from softrobots.compiled.run.results import EquilibriumBatch, MotionBatch
+from softrobots.compiled.run.results import EquilibriumBatch
 from softrobots.core.checks import FloatArray
+from softrobots.dynamics.starting import check_start
 from softrobots.dynamics.time_grid import SAME_TIME, merged_times
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.trajectory import Trajectory
 
 
@@ -26,6 +30,9 @@ class MotionCases:
         Raises:
             ParameterError: If a shape differs, the numbers of cases differ, or a path or a table is wrong.
         """
+        held = starts if isinstance(starts, Equilibrium) else None
+        if held is not None:
+            starts = held.q_springs
         if isinstance(starts, MotionBatch):
             starts = starts.q_springs[:, -1], starts.velocities[:, -1]
         springs, rates = starts if isinstance(starts, tuple) and len(starts) == 2 else (starts, None)
@@ -44,10 +51,14 @@ class MotionCases:
             if len(moving) > 1:
                 arrays[name] = np.tile(arrays[name][0], (len(moving), 1)), arrays[name][1]
         motors, pushes, springs, rates = batch_rows(**arrays)
+        if held is not None:
+            check_start(model, held, np.array([path(0.0) for path in self._paths]) if self._paths else motors)
         self.count = len(motors)
         """Number of cases."""
         self.bad = unusable(motors, pushes, springs, rates) | actuation.unsuited(motors)
         """Mask of the cases with numbers that cannot be computed with, shape (n,)."""
+        self.failures: dict[int, tuple[float, Exception]] = {}
+        """Time [s] before which a function of a case has failed, and its error, by case."""
         self._motors, self._forces = without(motors, self.bad, model.relaxed_motors), without(pushes, self.bad)
         self.state = without(springs, self.bad, model.rest), without(rates, self.bad)
         """Elastic coordinates and rates at the start, each shape (n, n_springs)."""
@@ -77,11 +88,40 @@ class MotionCases:
 
     def motors(self, grid: FloatArray, rows: slice) -> FloatArray:
         """Return the motors of some cases, shape (n or 1, 2 n_steps + 1 or 1, n_motors); see `motors_of_steps`."""
-        return _stacked([motors_of_steps(path, grid) for path in _some(self._paths, rows)], self._motors[rows])
+        return self._sampled(motors_of_steps, self._paths, grid, rows, self._motors, 2 * len(grid) - 1)
 
     def forces(self, grid: FloatArray, rows: slice) -> FloatArray:
         """Return the forces of some cases, shape (n or 1, n_steps or 1, 3) [N]; see `forces_of_steps`."""
-        return _stacked([forces_of_steps(load, grid) for load in _some(self._loads, rows)], self._forces[rows])
+        return self._sampled(forces_of_steps, self._loads, grid, rows, self._forces, len(grid) - 1)
+
+    def _sampled(
+        self,
+        sample: Callable[[Any, FloatArray], FloatArray],
+        moving: list[Any],
+        grid: FloatArray,
+        rows: slice,
+        still: FloatArray,
+        count: int,
+    ) -> FloatArray:
+        """What drives some cases: `count` samples of what moves, NaN from where a function fails, or what stands still."""
+        found, shared = [], len(moving) == 1
+        for case, one in enumerate(moving if shared else moving[rows], 0 if shared else rows.start):
+            values, valid, beyond, tried = np.zeros((0, still.shape[1])), 0, len(grid) + 1, len(grid)
+            while beyond - valid > 1:
+                try:
+                    values, valid = sample(one, grid[:tried]), tried
+                except Exception as error:  # of a function of the caller: anything
+                    beyond, failure = tried, (float(grid[max(tried - 2, 0)]), error)
+                tried = (valid + beyond) // 2
+            if valid < len(grid):
+                self.failures.setdefault(case, failure)
+                self.bad[slice(None) if shared else case] = True
+                values = np.pad(values, ((0, count - len(values)), (0, 0)), constant_values=np.nan)
+            found.append(values)
+        if not found:
+            return np.ascontiguousarray(still[rows][:, None])
+        longest = max(map(len, found))
+        return np.stack([np.broadcast_to(one, (longest, one.shape[1])) for one in found])
 
 
 def _moving(given: Any) -> list[Any]:
@@ -95,14 +135,3 @@ def _changes(given: Any) -> bool:
     """Tell whether it is a function of time, a trajectory, or a table `(times, values)`."""
     table = isinstance(given, tuple) and len(given) == 2 and np.ndim(given[0]) == 1
     return table or callable(given) or isinstance(given, Trajectory)
-
-
-def _some(moving: list[Any], rows: slice) -> list[Any]:
-    return moving if len(moving) == 1 else moving[rows]
-
-
-def _stacked(paths: list[FloatArray], still: FloatArray) -> FloatArray:
-    if not paths:
-        return np.ascontiguousarray(still[:, None])
-    longest = max(map(len, paths))
-    return np.stack([np.broadcast_to(one, (longest, one.shape[1])) for one in paths])

@@ -5,7 +5,7 @@ from __future__ import annotations
 import itertools
 import math
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,6 +17,7 @@ from softrobots.compiled.run.motion_course import Course, SpringKicks, forces_of
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NotConverged
+from softrobots.core.progress import with_progress
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import State, Step
@@ -54,6 +55,8 @@ class StepsTaken:
     """Measured error of the tip, the largest of all rows, shape (n,) [m]."""
     is_within: bool = True
     """Whether that is within the tolerance; so are fixed steps."""
+    failure: tuple[float, Exception] | None = None
+    """Time [s] before which a function of the one case failed, and its error."""
 
 
 def first_grid(rows: FloatArray, breaks: Sequence[FloatArray], order: int) -> FloatArray:
@@ -95,19 +98,42 @@ def halve_to_tolerance(
 
 
 def take_one(
-    run: Any, state: tuple[FloatArray, FloatArray], given: Given, course: Course, grid: FloatArray, times: FloatArray
+    run: Any,
+    state: tuple[FloatArray, FloatArray],
+    given: Given,
+    course: Course,
+    grid: FloatArray,
+    times: FloatArray,
+    progress: bool | str = False,
 ) -> StepsTaken:
-    """Take the steps of a grid from a state, unknowns and rates; `times` are those of the rows."""
+    """Take the steps of a grid from a state, unknowns and rates; `times` are those of the rows.
+
+    A function that fails ends them before that time; its error is raised if there is no step before it.
+    """
     w, layout = run.workspace(), run.layout
     n, last = layout.unknowns, len(grid) - 1
     for place, values in [(layout.position, state[0]), (layout.velocity, state[1]), *given]:
         run.put(w, place, values)
     rows, status, interrupted = np.full((1, len(times), 2 * n + 3), np.nan), Status.CERTIFIED, False
     rows[0, 0] = np.concatenate([*state, np.zeros(3)])  # even if no step is taken
+    failure = None
+    parts = list(itertools.pairwise(sorted({*_stops(grid, course.path.kick_times), *range(0, last, _CHUNK)})))[::-1]
     try:
-        for first, end in itertools.pairwise(sorted({*_stops(grid, course.path.kick_times), *range(0, last, _CHUNK)})):
+        for first, end in with_progress(
+            _taken_off(parts), progress, label=f"motion, {last} steps", unit="part", total=len(parts)
+        ):
             part, within = grid[first : end + 1], _times_within(times, grid, first, end)
-            motors, forces = motors_of_steps(course.path, part), forces_of_steps(course.load, part)
+            try:
+                motors, forces = motors_of_steps(course.path, part), forces_of_steps(course.load, part)
+            except Exception as error:  # of the caller: anything
+                if end - first > 1:
+                    middle = (first + end) // 2
+                    parts += [(middle, end), (first, middle)]
+                    continue
+                if first == 0:
+                    raise
+                failure = float(grid[first]), error
+                break
             out = run.flat(rows[0, within])
             paths = run.flat(motors), len(motors), run.flat(forces), len(forces)
             seen = run.flat(times[within]), within.stop - within.start, out
@@ -121,11 +147,24 @@ def take_one(
                 run.put(w, layout.velocity, v + course.spring_kicks.at(course.path(time), y, course.path.kicks[time]))
     except KeyboardInterrupt:
         interrupted = True
-    return StepsTaken(grid, rows, np.array([status]), interrupted)
+    return StepsTaken(grid, rows, np.array([status if failure is None else Status.NOT_A_NUMBER]), interrupted, failure=failure)
+
+
+def _taken_off(parts: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
+    """Take the last part off a list, to which more may be added, until it is empty."""
+    while parts:
+        yield parts.pop()
 
 
 def take_batch(
-    run: Any, given: Given, cases: MotionCases, spring_kicks: SpringKicks, grid: FloatArray, times: FloatArray, threads: int
+    run: Any,
+    given: Given,
+    cases: MotionCases,
+    spring_kicks: SpringKicks,
+    grid: FloatArray,
+    times: FloatArray,
+    threads: int,
+    progress: bool | str = False,
 ) -> StepsTaken:
     """Take the steps of a grid with many cases; `given` has positions, velocities and what is the same for all cases."""
     n = run.layout.unknowns
@@ -159,7 +198,9 @@ def take_batch(
 
     with ThreadPoolExecutor(threads) as pool:
         try:
-            list(pool.map(solve, range(0, cases.count, size)))
+            blocks = range(0, cases.count, size)
+            done = pool.map(solve, blocks)
+            list(with_progress(done, progress, label=f"motions, {len(grid) - 1} steps", unit="block", total=len(blocks)))
         except KeyboardInterrupt:
             stopped.set()
     return StepsTaken(grid, out, statuses, stopped.is_set())

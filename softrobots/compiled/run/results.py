@@ -1,4 +1,4 @@
-"""Results of the compiled solvers of statics and motion, of one case or many."""
+"""Results of the compiled solvers of statics, of one case or many."""
 
 from __future__ import annotations
 
@@ -10,9 +10,10 @@ import numpy as np
 
 from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.motion_batch import CaseResults, table_of_cases
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, read_only
-from softrobots.core.result_file import TABLES, vector_columns
+from softrobots.core.result_file import TABLES
 from softrobots.core.summary import Part, Summarised, Table, facts, field_facts
 from softrobots.model.soft_model import SoftModel
 
@@ -145,24 +146,6 @@ class CompiledLoadEstimate(CompiledEquilibrium):
         return self._root("observed")
 
 
-class CaseResults(Summarised):
-    """Results of many cases."""
-
-    status: Any
-    """`Status` of each case, shape (n,)."""
-
-    def __post_init__(self) -> None:
-        """Make the arrays read-only."""
-        for array in vars(self).values():
-            if isinstance(array, np.ndarray):
-                array.setflags(write=False)
-
-    @property
-    def certified(self) -> Any:
-        """Mask of the valid cases, shape (n,)."""
-        return self.status == Status.CERTIFIED
-
-
 @dataclass(frozen=True, eq=False, repr=False)
 class Batch(CaseResults):
     """Common results of all batches, one row a case."""
@@ -222,57 +205,4 @@ class MotorBatch(Batch):
     """Angle between the loaded tip and its target orientation, shape (n,) [rad]; None for positions."""
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class MotionBatch(CaseResults):
-    """Motions of many cases, at the same times."""
-
-    time: FloatArray
-    """Times of the rows, shape (t,) [s]."""
-    q_springs: FloatArray
-    """Elastic coordinates, shape (n, t, n_springs) [rad or m]."""
-    velocities: FloatArray
-    """Their rates, shape (n, t, n_springs) [rad/s or m/s]."""
-    tip_position: FloatArray
-    """The tip, shape (n, t, 3) [m], world axes."""
-    status: Any
-    """`Status` of each case, shape (n,), small integers; only rows with `Status.CERTIFIED` are valid."""
-    steps: FloatArray
-    """Times at the ends of all steps, the first included, shape (m,) [s]."""
-    tip_error: FloatArray | None = None
-    """Measured error of the tip, the largest of all rows, with a safety factor of 1.2, shape (n,) [m]; None for fixed steps,
-    where it is not measured."""
-    tolerance: float | None = None
-    """Largest `tip_error` that was asked for [m]; None for fixed steps."""
-    interrupted: bool = False
-    """Whether Ctrl-C ended the run: cases that were not at their end are `Status.UNSETTLED`, with zeros for what is missing."""
-
-
-_AXES = {"tip_positions": ("tip", "m"), "tip_position": ("tip", "m"), "forces": ("force", "N")}
-_SINGLE = {"residual": "N m", "unexplained": "N m", "observability": "m", "tip_error": "m", "orientation_error": "rad"}
-_NUMBERED = {
-    "q_motors": ("motor", "rad or m"),
-    "q_springs": ("spring", "rad or m"),
-    "velocities": ("spring velocity", "rad/s or m/s"),
-}
-
-
-def _table(batch: Batch | MotionBatch) -> dict[str, Any]:
-    """Columns of a batch, a line a case, or an instant of a case; actuators and springs by number, in the model's order."""
-    table, each, n = dict[str, Any](), 1, len(batch.status)
-    if isinstance(batch, MotionBatch):
-        each = len(batch.time)
-        table = {"case": np.repeat(np.arange(n), each), "time [s]": np.tile(batch.time, n)}
-    table["status"] = np.repeat(batch.status, each)
-    for name, values in vars(batch).items():
-        if name in _SINGLE and values is not None:
-            table[f"{name.replace('_', ' ')} [{_SINGLE[name]}]"] = np.repeat(values, each)
-        elif name in _AXES:
-            table |= vector_columns(*_AXES[name], values.reshape(-1, 3))
-        elif name in _NUMBERED:
-            what, unit = _NUMBERED[name]
-            rows = values.reshape(-1, values.shape[-1])
-            table |= {f"{what} {number} [{unit}]": column for number, column in enumerate(rows.T, 1)}
-    return table
-
-
-TABLES.update({Batch: _table, MotionBatch: _table})
+TABLES[Batch] = table_of_cases
