@@ -212,11 +212,11 @@ class Gaps(Candidates):
         found: list[FloatArray] = []
         weights: list[float] = []
         for row in rows:
-            pair = int(self.capsules[row]), int(self.obstacles[row]) - len(self._transforms)
+            capsule, other, feature = self.keys[row]
+            pair = capsule, other - len(self._transforms)
             distance = float(self.distances[row] + self._cores.radii[pair[1]])
-            slides = bool(self.features[row] == INSIDE)
             point, normal = self.core_points[row], self.normals[row]
-            new, each = relative_curvature(self._cores, self.places, pair, point, normal, distance, slides)
+            new, each = relative_curvature(self._cores, self.places, pair, point, normal, distance, feature == INSIDE)
             found += new
             weights += [float(forces[row]) * weight for weight in each]
         return np.array([(np.array(found).T * weights).T, found])
@@ -277,8 +277,12 @@ class Surroundings:
 
     def pair(self, gaps: Gaps, place: int) -> tuple[str, str, bool]:
         """Link of a candidate; its obstacle, or other link; and whether that is a link."""
-        other = int(gaps.obstacles[place])
-        return self._links[gaps.capsules[place]], self._names[other], other >= len(self._transforms)
+        capsule, other, _ = gaps.keys[place]
+        return self.link(capsule), self._names[other], other >= len(self._transforms)
+
+    def link(self, capsule: int) -> str:
+        """Link of a capsule."""
+        return self._links[capsule]
 
     def at(self, q: FloatArray, margin: float) -> Gaps:
         """Return the candidates of contact.

@@ -10,6 +10,7 @@ of the radius :math:`r + R` is within it by less than :math:`0.008\,(r + R)`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
+from typing import NamedTuple
 
 import numpy as np
 
@@ -20,8 +21,19 @@ from softrobots.environment.obstacles import Box, Capsule, Cylinder, Obstacle, S
 _SHARE = 0.25
 
 
-def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Callable[[float], Gaps]) -> bool:
-    """Whether a robot may have passed through an obstacle, or through itself, on a straight way.
+class Pass(NamedTuple):
+    """A capsule that may have passed through an obstacle."""
+
+    capsule: int
+    """The capsule."""
+    obstacle: int
+    """The obstacle; their number, where it is the robot itself."""
+    way: float
+    """How far the one moves relative to the other [m]."""
+
+
+def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Callable[[float], Gaps]) -> Pass | None:
+    """Find what may have passed through an obstacle, or through the robot itself, on a straight way.
 
     One that grows cannot: it is on the way that it went.
 
@@ -30,6 +42,9 @@ def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Calla
         now: The robot, of as many capsules, and the obstacles after the step.
         obstacles: The obstacles.
         near: The candidates before the step, of gaps up to that given [m].
+
+    Returns:
+        What moves farthest of all that may have passed; None if nothing may.
     """
     radii, ends = now.capsule_radii, before.places.ends
     rooms = _SHARE * (np.array([inner_radius(one) for one in obstacles])[:, None] + radii)
@@ -41,10 +56,12 @@ def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Calla
         ways, rooms = np.vstack([ways, way + way.max()]), np.vstack([rooms, _SHARE * (radii + radii.min())])
     far = ways > rooms
     if not far.any():
-        return False
+        return None
     candidates, gaps = near(float(ways[far].max())), np.full(len(ways), np.inf)
     np.minimum.at(gaps, np.minimum(candidates.obstacles, len(ways) - 1), candidates.values)
-    return bool((far & (ways > gaps[:, None])).any())
+    passing = np.where(far & (ways > gaps[:, None]), ways, 0.0)
+    obstacle, capsule = divmod(int(passing.argmax()), passing.shape[1])
+    return Pass(capsule, obstacle, float(passing.max())) if passing.any() else None
 
 
 def inner_radius(obstacle: Obstacle) -> float:
