@@ -163,7 +163,7 @@ def obstructed(given: Given, last: Rest) -> str:
     if not len(gaps):
         return ""
     link, other, _ = surroundings.pair(gaps, int(gaps.values.argmin()))
-    return f"; {link!r} is at {other!r}: move the motors or the obstacle less far, or by another way"
+    return f"; {link!r} is at {other!r}: move robot or obstacle less far, or by another way"
 
 
 def let_go(last: Sliding) -> Sliding:

@@ -29,7 +29,7 @@ from softrobots.statics.contact.contact_path import ContactPath
 from softrobots.statics.contact.contact_walk import ContactWalk
 from softrobots.statics.contact.last_state import Given, Sliding
 from softrobots.statics.contact.newton_in_contact import ByMotors, followed
-from softrobots.statics.contact.quasi_static import FAR, Rest, at_rest, change, may_have_passed, settle, step
+from softrobots.statics.contact.quasi_static import FAR, Rest, at_rest, change, may_have_passed, obstructed, settle, step
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_goal import Goal
@@ -240,10 +240,11 @@ class TargetWay:
         best = here.equilibrium()
         left = float(np.linalg.norm(self._goals[number - 1].position - best.tip_position))
         held = [f"{one.link!r} {one.status} on {one.obstacle!r} with {one.normal_force:.3g} N" for one in best.contacts]
+        near = obstructed(here.robot.given, here)
         raise TargetUnreachable(
             f"waypoint {number} of {len(self._goals)}: with friction no small step leads nearer from where the tip is "
             f"{left:.6g} m from it, with motors {best.q_motors.round(6).tolist()}"
-            + (f"; {', '.join(held)}, also when pressed less" if held else ""),
+            + (f"; {', '.join(held)}, also when pressed less" if held else near),
             best=best,
             residual=left,
             iterations=best.iterations,
