@@ -93,7 +93,8 @@ def _change(here: Balance, coefficient: float, none: float, forced: float) -> tu
     """Newton's change, in which no contact is to do what others and the robot do not let it.
 
     One whose gap would be left open by more than `none` [m] is taken as open: of contacts in nearly the same place, as on both
-    sides of a joint, no motion closes all gaps. Where all close, one that sticks and would be left sliding by more than
+    sides of a joint, no motion closes all gaps. So is one that would pull: both ends of neighbouring chords are pressed only if
+    the robot must bend hard between them. Where all close, one that sticks and would be left sliding by more than
     `forced` [m] slips, with its friction against that.
     """
     while True:
@@ -102,9 +103,10 @@ def _change(here: Balance, coefficient: float, none: float, forced: float) -> tu
             return None
         left = np.where(laws.pressed, near.gaps + near.gradients @ change[0], 0.0)
         slid = np.where(laws.sticks[:, None], near.sliding + near.jacobian @ change[0], 0.0)
-        ways = np.linalg.norm(slid, axis=1)
-        if left.max(initial=0.0) > none:
-            kept = np.arange(len(left)) != left.argmax()
+        ways, pulls = np.linalg.norm(slid, axis=1), np.where(laws.pressed, -here.normal - change[1], 0.0)
+        worst = left if left.max(initial=0.0) > none else pulls
+        if worst is left or pulls.max(initial=0.0) > CONE * float(here.normal.max(initial=0.0)):
+            kept = np.arange(len(left)) != worst.argmax()
             laws = laws._replace(pressed=laws.pressed & kept, sticks=laws.sticks & kept, slips=laws.slips & kept)
         elif ways.max(initial=0.0) > forced:
             slips = np.arange(len(left)) == ways.argmax()
