@@ -174,7 +174,7 @@ class TargetWay:
                     return None
                 found = self._least(tip, here.q_motors, found)
                 turn, far = found.q_motors - here.q_motors, self._far(found.state.q_springs - here.q_springs)
-                if may_have_passed(found.state.robot, here):
+                if far <= 1.0 and may_have_passed(found.state.robot, here):
                     return None
                 if far <= 1.0:
                     return found.state._replace(work=work + found.state.work)
