@@ -174,10 +174,9 @@ class TargetWay:
                     return None
                 found = self._least(tip, here.q_motors, found)
                 turn, far = found.q_motors - here.q_motors, self._far(found.state.q_springs - here.q_springs)
-                if far <= 1.0 and may_have_passed(found.state.robot, here):
-                    return None
                 if far <= 1.0:
-                    return found.state._replace(work=work + found.state.work)
+                    passed = may_have_passed(found.state.robot, here)
+                    return None if passed else found.state._replace(work=work + found.state.work)
             part = self._model.actuators.go(here.q_motors, min(0.5, 0.5 / far) * turn)
             turned = step(self.given(part), here)
             if turned is None or not np.any(part != here.q_motors):
@@ -240,11 +239,10 @@ class TargetWay:
         best = here.equilibrium()
         left = float(np.linalg.norm(self._goals[number - 1].position - best.tip_position))
         held = [f"{one.link!r} {one.status} on {one.obstacle!r} with {one.normal_force:.3g} N" for one in best.contacts]
-        near = obstructed(here.robot.given, here)
         raise TargetUnreachable(
             f"waypoint {number} of {len(self._goals)}: with friction no small step leads nearer from where the tip is "
             f"{left:.6g} m from it, with motors {best.q_motors.round(6).tolist()}"
-            + (f"; {', '.join(held)}, also when pressed less" if held else near),
+            + (f"; {', '.join(held)}, also when pressed less" if held else obstructed(here.robot.given, here)),
             best=best,
             residual=left,
             iterations=best.iterations,
