@@ -10,7 +10,6 @@ of the radius :math:`r + R` is within it by less than :math:`0.008\,(r + R)`.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable
-from typing import NamedTuple
 
 import numpy as np
 
@@ -21,18 +20,9 @@ from softrobots.environment.obstacles import Box, Capsule, Cylinder, Obstacle, S
 _SHARE = 0.25
 
 
-class Pass(NamedTuple):
-    """A capsule that may have passed through an obstacle."""
-
-    capsule: int
-    """The capsule."""
-    obstacle: int
-    """The obstacle; their number, where it is the robot itself."""
-    way: float
-    """How far the one moves relative to the other [m]."""
-
-
-def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Callable[[float], Gaps]) -> Pass | None:
+def may_pass(
+    before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Callable[[float], Gaps]
+) -> tuple[int, int, float] | None:
     """Find what may have passed through an obstacle, or through the robot itself, on a straight way.
 
     One that grows cannot: it is on the way that it went.
@@ -44,7 +34,8 @@ def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Calla
         near: The candidates before the step, of gaps up to that given [m].
 
     Returns:
-        What moves farthest of all that may have passed; None if nothing may.
+        Capsule, obstacle (their number, where it is the robot itself) and way [m] of what moves farthest of all that may have
+        passed; None if nothing may.
     """
     radii, ends = now.capsule_radii, before.places.ends
     rooms = _SHARE * (np.array([inner_radius(one) for one in obstacles])[:, None] + radii)
@@ -61,7 +52,7 @@ def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Calla
     np.minimum.at(gaps, np.minimum(candidates.obstacles, len(ways) - 1), candidates.values)
     passing = np.where(far & (ways > gaps[:, None]), ways, 0.0)
     obstacle, capsule = divmod(int(passing.argmax()), passing.shape[1])
-    return Pass(capsule, obstacle, float(passing.max())) if passing.any() else None
+    return (capsule, obstacle, float(passing.max())) if passing.any() else None
 
 
 def inner_radius(obstacle: Obstacle) -> float:

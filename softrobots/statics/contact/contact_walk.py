@@ -17,9 +17,7 @@ EVENT = 2.0**-7
 
 
 PATIENT = 2.0**-4
-"""Largest step that is tried again where Newton's method does not converge at once: halving a larger one takes less.
-
-So it does where the last step was shorter."""
+"""Largest step that is tried again where Newton's method does not converge at once: halving a larger one takes less."""
 
 _LONGEST_PAUSE = 16
 

@@ -18,7 +18,7 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.environment.gaps import Surroundings
-from softrobots.environment.swept import Pass, may_pass
+from softrobots.environment.swept import may_pass
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_laws import Balance
 from softrobots.statics.contact.coulomb import GAP, solve_step
@@ -109,7 +109,7 @@ def step(given: Given, last: Rest, *, patient: bool = True) -> Rest | None:
     return there
 
 
-def may_have_passed(now: SlidingRobot, last: Rest) -> Pass | None:
+def may_have_passed(now: SlidingRobot, last: Rest) -> tuple[int, int, float] | None:
     """Find what of the robot, where it was asked last, may have passed through an obstacle since a rest; None if nothing."""
     before, surfaces = last.robot, now.last.gaps
     return may_pass(
@@ -157,8 +157,9 @@ def obstructed(given: Given, last: Rest) -> str:
     gaps, surroundings = robot.at.gaps, given.surroundings
     passed = may_have_passed(robot, last)
     if passed is not None:
-        name = (*given.environment.names, "the robot itself")[passed.obstacle]
-        what = f"{surroundings.link(passed.capsule)!r} and {name!r} move by {passed.way:.3g} m against each other at once"
+        capsule, obstacle, way = passed
+        name = (*given.environment.names, "the robot itself")[obstacle]
+        what = f"{surroundings.link(capsule)!r} and {name!r} move by {way:.3g} m against each other at once"
         return f"; {what}: motors and poses must lead there in smaller steps, or give more rows"
     if not len(gaps):
         return ""
