@@ -58,14 +58,15 @@ class Gaps(Candidates):
         self.keys: tuple[tuple[int, int, int], ...] = tuple(keys)
         """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next. Numbers of
         obstacles beyond the last are capsules of the robot itself: the number less that of obstacles."""
-        capsules = [capsule for capsule, _, _ in keys]
-        radii = [cores.plain[capsule][2] for capsule in capsules]
-        self.values: FloatArray = np.array([row[1] - radius for row, radius in zip(self._rows, radii, strict=True)])
+        plain = found.given is self.plain
+        capsules = np.array([key[0] for key in keys], dtype=np.intp) if plain else self.capsules
+        distances = np.array([row[1] for row in self._rows]) if plain else self.distances
+        self.values: FloatArray = distances - cores.radii.take(capsules)
         """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
         self._cores, self.places, self._transforms, self.reach = cores, places, transforms, reach
         self.with_itself = own
         """Whether the robot may touch itself."""
-        self.moves: FloatArray = cores.moves.take(np.array(capsules, dtype=np.intp), 0)
+        self.moves: FloatArray = cores.moves.take(capsules, 0)
         """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
 
         Where the robot touches itself, less that of the other capsule."""
