@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 import pinocchio as pin
 import pytest
 
 import softrobots as sr
+from tests.support.planar_robots import joint, robot
 
 PRESS = np.array([0.0, 0.0, -15.0])
 ACROSS = [[1, 0, 0], [0, 0, -1], [0, 1, 0]]  # axes of a peg along y
@@ -154,8 +157,29 @@ def test_a_ball_is_driven_against_an_arm_that_snaps_past_it_in_any_number_of_row
     assert np.ptp(snaps) < 1e-4  # the smallest step, 1.2 / 2^14
 
 
+@pytest.mark.study
+@pytest.mark.parametrize(
+    ("pose", "told"),
+    [
+        (lambda s: moved(x=0.0 if s < 0.5 else -0.8), "'cart' and 'ball' move by 0.8 m against each other at once"),
+        (lambda s: moved(x=-s), "'cart' is at 'ball': move robot or obstacle less far"),
+    ],
+)
+def test_what_cannot_be_followed_is_named(pose: Any, told: str) -> None:
+    """A ball that is elsewhere at once, and one that is driven into a cart that no spring moves."""
+    joints = [joint("push", "prismatic", "base", "cart", "1 0 0"), joint("along", "prismatic", "cart", "tip", "1 0 0", 100.0)]
+    model = robot(("base", "cart", "tip"), joints, [("cart", "0 0 1", "0 0 1", 0.1), ("tip", "0 0 2", "0 0 2", 0.1)])
+    ball = sr.Environment([sr.Sphere(0.1, (0.5, 0, 1), name="ball", pose=pose)])
+    with pytest.raises(sr.EquilibriumNotFound, match=f"between rows 1 and 2, at parameter .*{told}"):
+        sr.follow_contact(model, [0.0], environment=ball, parameters=[-0.1, 0.0, 1.0])
+
+
 def test_a_link_that_swings_against_another_one_stays_on_its_side_in_any_number_of_rows() -> None:
-    """The third link of a folded arm would swing through the first; they touch at the angle of rigid links."""
+    """The third link of a folded arm would swing through the first; they touch at the angle of rigid links.
+
+    Pressed on, it gives way to one side of its plane or, as rounding decides, to the other: every second spring turns the other
+    way in the mirror image.
+    """
     model = sr.load_model(
         sr.InflatableArm(link_lengths=(0.5, 0.4, 0.3), hinge_offset=0.03, radius=0.03, stiffness=100.0, pressure=50e3)
     )
@@ -168,5 +192,6 @@ def test_a_link_that_swings_against_another_one_stays_on_its_side_in_any_number_
         path = sr.follow_contact(model, np.array([(0, 0, 2.5, one) for one in motors]), environment=folded)
         (made,) = path.events
         assert -1.1 / (rows - 1) / 128 <= np.interp(made.parameter, np.arange(rows), motors) - touches <= 0.0
-        ends.append(path.equilibria[-1].q_springs)
+        springs = path.equilibria[-1].q_springs
+        ends.append(springs * np.tile([np.sign(springs[2]), 1.0], 3))
     assert ends[0] == pytest.approx(ends[1], abs=1e-9)

@@ -129,6 +129,20 @@ def test_what_sticks_is_a_pin(arm: sr.SoftModel) -> None:
     assert path.tip_error.max() < 1e-9
 
 
+@pytest.mark.parametrize(("thick", "rows"), [(0.02, 2), (0.02, 3), (0.2, 2)])
+def test_a_tip_stops_before_a_plate_in_any_number_of_rows(thick: float, rows: int) -> None:
+    """A ball on a spring that nothing else touches: from 0 to 1 m there is a plate in the middle.
+
+    It ends a radius of 0.1 m before that, less the smallest step, 2^-14 of a row.
+    """
+    way, plate = np.linspace(0.0, 1.0, rows), sr.Environment([sr.Box((thick, 1.0, 1.0), (0.5, 0.0, 0.5), name="plate")])
+    targets = np.column_stack([way, np.zeros(rows), np.full(rows, 0.1)])
+    with pytest.raises(sr.TargetUnreachable, match="'tip' is at 'plate'") as caught:
+        sr.follow_trajectory(block(), targets, environment=plate, friction=0.3)
+    left = 0.5 - 0.5 * thick - 0.1 - caught.value.best.tip_position[0]
+    assert -1e-9 <= left <= 2.0**-14 / (rows - 1) + 1e-9
+
+
 def test_what_friction_cannot_have_is_refused(arm: sr.SoftModel) -> None:
     for options in ({}, {"environment": WALL, "allow_jumps": True}):
         with pytest.raises(sr.ParameterError, match="friction"):

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 
 import numpy as np
 
@@ -12,7 +13,7 @@ from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
-from softrobots.environment.single_bodies import Seen
+from softrobots.environment.single_bodies import Seen, inner
 from softrobots.environment.single_pairs import single_pair
 
 _NOBODY = np.zeros(0, dtype=np.intp)
@@ -21,27 +22,68 @@ INSIDE = 2
 """Feature of the minimum between the ends of a core; 0 and 1 are start and end, larger numbers crossed borders."""
 
 
-class Candidates(NamedTuple):
-    """Candidates, sorted by field."""
+Columns = tuple[Any, Any, Any, FloatArray, FloatArray, FloatArray]
+"""Capsule, obstacle, feature, point, distance and normal of candidates as arrays, see `Candidates`."""
 
-    parts: list[tuple[Field, Any]]
-    """Fields, with the body of each of their candidates there."""
-    capsules: Any
-    """Capsule of each candidate, shape (m,), integers."""
-    obstacles: Any
-    """Obstacle of each, shape (m,), integers."""
-    features: Any
-    """Feature of each, shape (m,), integers: see `INSIDE`."""
-    points: FloatArray
-    """Material points of the cores, shape (m, 3) [m]."""
-    distances: FloatArray
-    """Their distances from the obstacles, shape (m,) [m]."""
-    normals: FloatArray
-    """Normals from obstacle to robot, shape (m, 3)."""
+Plain = tuple[list[tuple[int, int, int]], list[tuple[Any, float, Any]]]
+"""The same in plain numbers: capsule, obstacle and feature of each candidate; point, distance and normal of each."""
 
 
-NOTHING = Candidates([], _NOBODY, _NOBODY, _NOBODY, np.zeros((0, 3)), np.zeros(0), np.zeros((0, 3)))
-"""No candidate."""
+class Candidates:
+    """Candidates, sorted by field: as arrays or in plain numbers, each made of the other where it is asked."""
+
+    def __init__(self, parts: list[tuple[Field, Any]], given: Columns | Plain) -> None:
+        """Take fields, with the body of each of their candidates there, and one of both forms."""
+        self.parts, self.given = parts, given
+
+    @cached_property
+    def plain(self) -> Plain:
+        """In plain numbers."""
+        if len(self.given) == 2:
+            return self.given
+        lists = [column.tolist() for column in self.given]
+        return list(zip(*lists[:3], strict=True)), list(zip(*lists[3:], strict=True))
+
+    @cached_property
+    def columns(self) -> Columns:
+        """As arrays."""
+        if len(self.given) != 2:
+            return self.given
+        keys, rows = self.given
+        points, distances, normals = zip(*rows, strict=True) if rows else ((), (), ())
+        capsules, obstacles, features = np.array(keys, dtype=np.intp).reshape(-1, 3).T
+        places = np.array(points).reshape(-1, 3), np.array(distances), np.array(normals).reshape(-1, 3)
+        return capsules, obstacles, features, *places
+
+    @property
+    def capsules(self) -> Any:
+        """Capsule of each candidate, shape (m,), integers."""
+        return self.columns[0]
+
+    @property
+    def obstacles(self) -> Any:
+        """Obstacle of each, shape (m,), integers."""
+        return self.columns[1]
+
+    @property
+    def features(self) -> Any:
+        """Feature of each, shape (m,), integers: see `INSIDE`."""
+        return self.columns[2]
+
+    @property
+    def core_points(self) -> FloatArray:
+        """Material points of the cores, shape (m, 3) [m]."""
+        return self.columns[3]
+
+    @property
+    def distances(self) -> FloatArray:
+        """Their distances from the obstacles, shape (m,) [m]."""
+        return self.columns[4]
+
+    @property
+    def normals(self) -> FloatArray:
+        """Normals from obstacle to robot, shape (m, 3)."""
+        return self.columns[5]
 
 
 def find_candidates(
@@ -60,44 +102,48 @@ def find_candidates(
     Returns:
         The candidates.
     """
-    ends = places.ends.reshape(-1, 3).take(cores.single_ends, 0)
     found: list[Candidates] = []
     for field, numbers in fields:
-        if len(ends) * len(numbers) <= _FEW and field.single(0) is not None:
-            found += _few(field, numbers, cores, ends.tolist(), margin, merged)
-            continue
-        distances, limits = field.at_least(ends), margin + cores.radii
-        standing = _standing(field, cores, ends, distances) if len(cores.at_base) else None
-        if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
-            touching = distances <= limits.take(cores.end_capsules)[:, None]
-            if standing is not None:
-                touching &= ~standing
-            near, which = touching.nonzero()
-            values = distances.take(near * len(numbers) + which)
-            capsules, features = cores.end_capsules.take(near), cores.end_features.take(near)
-            normals = field.normals.take(which, 0)
-            new = Candidates([(field, which)], capsules, which, features, ends.take(near, 0), values, normals)
+        plain = len(places.points) * len(numbers) <= _FEW
+        if plain and isinstance(field, HalfSpaces):
+            found.append(_few_planes(field, numbers, cores, places.points, margin))
+        elif plain and field.single(0) is not None:
+            found.append(_few(field, numbers, cores, places.points, margin, merged))
         else:
-            # the distance changes by at most the length of the way: what is far at both ends is far between them
-            near, which = (
-                np.add.reduce(distances.take(cores.end_numbers, 0), 1) <= (2.0 * margin + cores.ways)[:, None]
-            ).nonzero()
-            if not len(near):
-                continue
-            counted = cores.counted.take(near, 0)
-            if standing is not None:
-                counted &= ~standing[cores.end_numbers[near], which[:, None]]
-            new = _near(field, places, near, which, counted, limits, merged)
-        if len(new.capsules):
-            found.append(Candidates(new.parts, new.capsules, numbers.take(new.obstacles), *new[3:]))
+            found.append(_many(field, numbers, cores, places, margin, merged))
     if pairs is not None:
         found.append(_own(cores, places, pairs, margin, merged, sum(len(numbers) for _, numbers in fields)))
     if len(found) == 1:
         return found[0]
-    if not found:
-        return NOTHING
     parts = [part for one in found for part in one.parts]
-    return Candidates(parts, *(np.concatenate(column) for column in zip(*(one[1:] for one in found), strict=True)))
+    if not found or not any(len(which) for _, which in parts):
+        return Candidates([], ([], []))
+    columns: Any = tuple(np.concatenate(rows) for rows in zip(*(one.columns for one in found), strict=True))
+    return Candidates(parts, columns)
+
+
+def _many(field: Field, numbers: Any, cores: Cores, places: CorePlaces, margin: float, merged: float) -> Candidates:
+    """The candidates of the bodies of a field, with their numbers, by NumPy."""
+    ends = places.single_ends
+    distances, limits = field.at_least(ends), margin + cores.radii
+    standing = _standing(field, cores, ends, distances) if len(cores.at_base) else None
+    if isinstance(field, HalfSpaces):  # bounds are distances, and they are least at ends
+        touching = distances <= limits.take(cores.end_capsules)[:, None]
+        if standing is not None:
+            touching &= ~standing
+        near, which = touching.nonzero()
+        values = distances.take(near * len(numbers) + which)
+        ones = cores.end_capsules.take(near), numbers.take(which), cores.end_features.take(near)
+        return Candidates([(field, which)], (*ones, ends.take(near, 0), values, field.normals.take(which, 0)))
+    # the distance changes by at most the length of the way: what is far at both ends is far between them
+    near, which = (np.add.reduce(distances.take(cores.end_numbers, 0), 1) <= (2.0 * margin + cores.ways)[:, None]).nonzero()
+    if not len(near):
+        return Candidates([], ([], []))
+    counted = cores.counted.take(near, 0)
+    if standing is not None:
+        counted &= ~standing[cores.end_numbers[near], which[:, None]]
+    capsules, which, *others = _near(field, places, near, which, counted, limits, merged)
+    return Candidates([(field, which)], (capsules, numbers.take(which), *others))
 
 
 def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArray) -> Any:
@@ -114,11 +160,27 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
     return standing
 
 
-def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, merged: float) -> list[Candidates]:
-    """The same for few ends, a list of points, and the bodies of a field, with their numbers, in plain numbers; or nothing."""
-    keys: list[tuple[int, int, int]] = []
-    rows: list[tuple[float, ...]] = []
-    for which in range(len(numbers)):
+def _few_planes(field: HalfSpaces, numbers: Any, cores: Cores, ends: Any, margin: float) -> Candidates:
+    """The same for few ends, a list of points, and half-spaces in plain numbers."""
+    bodies, keys, rows = list[int](), list[tuple[int, int, int]](), list[tuple[Any, float, Any]]()
+    planes = zip(numbers.tolist(), field.normals.tolist(), field.offsets.tolist(), strict=True)
+    for which, (obstacle, normal, offset) in enumerate(planes):
+        distances = [inner(end, normal) - offset for end in ends]
+        for number, (distance, (capsule, feature, radius)) in enumerate(zip(distances, cores.plain_ends, strict=True)):
+            if distance > margin + radius:
+                continue
+            base = cores.base_of.get(number)
+            if base is None or distances[base[0]] >= base[1]:  # else it stands there
+                bodies.append(which)
+                keys.append((capsule, obstacle, feature))
+                rows.append((ends[number], distance, normal))
+    return Candidates([(field, bodies)], (keys, rows))
+
+
+def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, merged: float) -> Candidates:
+    """The same for few ends, a list of points, and the bodies of a field, with their numbers, in plain numbers."""
+    bodies, keys, rows = list[int](), list[tuple[int, int, int]](), list[tuple[Any, float, Any]]()
+    for which, obstacle in enumerate(numbers.tolist()):
         body: Any = field.single(which)
         bounds = [math.dist(end, body.centre) - body.around for end in ends]
         seen: dict[int, Seen] = {}
@@ -143,18 +205,13 @@ def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, mer
                         continue
                 else:
                     continue
-                keys.append((capsule, which, feature))
-                rows.append((*point, distance, *body.out(normal)))
-    if not rows:
-        return []
-    (capsules, others, features), found = np.array(keys).T, np.array(rows)
-    columns = numbers.take(others), features, found[:, :3], found[:, 3], found[:, 4:]
-    return [Candidates([(field, others)], capsules, *columns)]
+                bodies.append(which)
+                keys.append((capsule, obstacle, feature))
+                rows.append((point, distance, body.out(normal)))
+    return Candidates([(field, bodies)], (keys, rows))
 
 
-def _near(
-    field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, limits: FloatArray, merged: float
-) -> Candidates:
+def _near(field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, limits: FloatArray, merged: float) -> Columns:
     """Candidates of pairs of core and body: ends where `counted`, shape (m, 2), truth values, and what is between them."""
     most, ends = limits.take(one), places.ends.take(one, 0)
     values, normals = field.at(ends.reshape(-1, 3), other.repeat(2))
@@ -165,11 +222,11 @@ def _near(
     at_ends = one.take(pair), which, chosen & 1, points, values.take(chosen), normals.take(chosen, 0)
     inner = core_points(field, other, ends[:, 0], places.spans.take(one, 0), most, merged, known)
     if not len(inner.pairs):
-        return Candidates([(field, which)], *at_ends)
+        return at_ends
     which = other.take(inner.pairs)
     new = (one.take(inner.pairs), which, INSIDE + inner.features, inner.points, inner.distances, inner.normals)
-    columns = [np.concatenate(pair) for pair in zip(at_ends, new, strict=True)] if len(chosen) else new
-    return Candidates([(field, columns[1])], *columns)
+    both: Any = tuple(np.concatenate(pair) for pair in zip(at_ends, new, strict=True)) if len(chosen) else new
+    return both  # type: ignore[no-any-return]
 
 
 def _own(cores: Cores, places: CorePlaces, pairs: Any, margin: float, merged: float, count: int) -> Candidates:
@@ -177,9 +234,10 @@ def _own(cores: Cores, places: CorePlaces, pairs: Any, margin: float, merged: fl
     field = own_capsules(cores, places)
     near = near_pairs(cores, places, pairs, margin)
     found = _near(field, places, near[:, 0], near[:, 1], np.True_, margin + cores.radii, merged)
-    ends = (found.features < INSIDE).nonzero()[0]
-    numbers = cores.end_numbers[found.capsules[ends], found.features[ends]]
-    found.capsules[ends], found.features[ends] = cores.end_capsules[numbers], cores.end_features[numbers]
-    different = different_contacts(cores, field, found.capsules, found.features, found.obstacles, found.points)
-    capsules, which, *others = (column[different] for column in found[1:])
-    return Candidates([(field, which)], capsules, count + which, *others)
+    capsules, which, features, points = found[:4]
+    ends = (features < INSIDE).nonzero()[0]
+    numbers = cores.end_numbers[capsules[ends], features[ends]]
+    capsules[ends], features[ends] = cores.end_capsules[numbers], cores.end_features[numbers]
+    different = different_contacts(cores, field, capsules, features, which, points)
+    capsules, which, features, *others = (column[different] for column in found)
+    return Candidates([(field, which)], (capsules, count + which, features, *others))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 import threading
-from typing import Any, NamedTuple
+from functools import cached_property
+from typing import Any
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -19,15 +20,36 @@ SAME_POINT = 1e-9
 """Distance, relative to the reach, within which points are one."""
 
 
-class CorePlaces(NamedTuple):
+class CorePlaces:
     """Cores in a configuration, world axes."""
 
-    ends: FloatArray
-    """Start and end of each core, shape (n, 2, 3) [m]."""
-    jacobian: FloatArray
-    """Velocity of the point of a body at the world's origin, then angular, per joint rate, shape (6, nv)."""
-    placements: FloatArray
-    """Transforms of the joints that carry capsules to the world, shape (k, 4, 4)."""
+    def __init__(self, cores: Cores, q: FloatArray, jacobian: FloatArray, points: list[Any]) -> None:
+        """Take the cores, Pinocchio's configuration, and what is known there."""
+        self._cores, self._q = cores, q
+        self.jacobian = jacobian
+        """Velocity of the point of a body at the world's origin, then angular, per joint rate, shape (6, nv)."""
+        self.points = points
+        """The different ends in plain numbers [m]."""
+
+    @cached_property
+    def single_ends(self) -> FloatArray:
+        """The different ends, shape (k, 3) [m]."""
+        return np.array(self.points).reshape(-1, 3)
+
+    @cached_property
+    def ends(self) -> FloatArray:
+        """Start and end of each core, shape (n, 2, 3) [m]."""
+        return self.single_ends.take(self._cores.end_numbers, 0)
+
+    @cached_property
+    def placements(self) -> FloatArray:
+        """Transforms of the joints that carry capsules to the world, shape (k, 4, 4)."""
+        return self._cores.placements(self._q)
+
+    def span(self, capsule: int) -> Any:
+        """From start to end of a core in plain numbers [m]."""
+        start, end = (self.points[number] for number in self._cores.plain[capsule][0])
+        return end[0] - start[0], end[1] - start[1], end[2] - start[2]
 
     @property
     def spans(self) -> FloatArray:
@@ -48,19 +70,21 @@ class Cores:
         self.ways = 2.0 * self.radii + self.lengths
         """Sum of the distances of both ends from what touches a capsule, at most, shape (n,) [m]."""
         self._model, self._data = model.workspace(None)
-        self._numbers, self.carrier = np.unique(self.joints, return_inverse=True)
-        self._numbers = self._numbers.tolist()
-        ends = np.array([[one.start, one.end] for one in self.capsules]).reshape(-1, 2, 3)
-        self._local = np.concatenate([ends, np.ones((self.count, 2, 1))], axis=2)
+        moved, self.carrier = np.unique(self.joints, return_inverse=True)
+        self._joints = [self._data.oMi[number] for number in moved.tolist()]  # references, which follow the robot
+        carriers = zip(self.carrier.tolist(), self.capsules, strict=True)
+        self._ends = [(self._joints[place], end) for place, one in carriers for end in (one.start, one.end)]
         nothing = read_only(np.zeros((0, self._model.nv)))
         self.no_load = JointLoad(read_only(np.zeros(self._model.nv)), nothing, nothing, None, None, 0.0, 0.0)
         """No load on the joints."""
         self.moves = self._motion()
         """1 where a joint coordinate moves a capsule, else 0, shape (n, nv)."""
+        self.end_numbers = np.arange(2 * self.count).reshape(-1, 2)
         self.single_ends, numbers, moving = self._single_ends(model)
         """The different ones of all ends (start and end of the first core, of the second, ...): neighbours share joints."""
         self.end_capsules, self.end_features = self.single_ends // 2, self.single_ends % 2
         """Capsule of each of them, and whether it is the start (0) or the end (1) of its core."""
+        self._ends = [self._ends[number] for number in self.single_ends.tolist()]
         self.end_numbers = numbers.reshape(-1, 2)
         """Place of start and end of each core among the different ends, shape (n, 2)."""
         self.counted = self.single_ends.take(self.end_numbers) == np.arange(2 * self.count).reshape(-1, 2)
@@ -75,18 +99,23 @@ class Cores:
         lists = (self.end_numbers.tolist(), self.counted.tolist(), self.radii.tolist(), self.lengths.tolist())
         self.plain = list(zip(*lists, strict=True))
         """Ends, whether each is counted, radius and length [m] of each core, in plain numbers."""
+        ends = self.end_capsules, self.end_features, self.radii.take(self.end_capsules)
+        self.plain_ends = list(zip(*(column.tolist() for column in ends), strict=True))
+        """Capsule, feature and radius [m] of each different end, in plain numbers."""
         self.fixed = np.flatnonzero(~moving[self.single_ends])
         """Different ends that no joint moves, shape (j,); none on a body beside the chain."""
-        self.fixed_points = self.at(pin.neutral(self._model)).ends.reshape(-1, 3)[self.single_ends][self.fixed]
+        self.fixed_points = self.at(pin.neutral(self._model)).single_ends[self.fixed]
         """Where they are, shape (j, 3) [m]."""
 
     def at(self, q: FloatArray) -> CorePlaces:
         """Return the cores at Pinocchio's configuration, shape (nq,)."""
         jacobian = pin.computeJointJacobians(self._model, self._data, q).reshape(6, self._model.nv)  # a copy
-        placements = self._data.oMi
-        transforms = np.array([placements[number].homogeneous for number in self._numbers])
-        ends = (self._local @ transforms.take(self.carrier, 0).swapaxes(1, 2))[:, :, :3]
-        return CorePlaces(ends, jacobian, transforms)
+        return CorePlaces(self, q, jacobian, [joint.act(end).tolist() for joint, end in self._ends])
+
+    def placements(self, q: FloatArray) -> FloatArray:
+        """Return the transforms of the joints that carry capsules to the world, shape (k, 4, 4)."""
+        pin.forwardKinematics(self._model, self._data, q)
+        return np.array([joint.homogeneous for joint in self._joints]).reshape(-1, 4, 4)
 
     def _motion(self) -> FloatArray:
         joints = self._model.joints
@@ -123,7 +152,7 @@ class Cores:
         return *np.unique(first, return_inverse=True), moving
 
     def _at_base(self, moving: Any) -> tuple[Any, Any]:
-        points = self.at(pin.neutral(self._model)).ends.reshape(-1, 3)[self.single_ends]
+        points = self.at(pin.neutral(self._model)).single_ends
         still = np.flatnonzero(~moving)
         if not len(still):  # of a body beside the chain: the end beside the first joint, which nearly stays
             beside = np.linalg.norm(points - self._model.jointPlacements[1].translation, axis=1)

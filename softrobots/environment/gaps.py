@@ -46,45 +46,45 @@ class MaterialPoints(NamedTuple):
     """Point of the obstacle in its own axes, shape (m, 3) [m]."""
 
 
-class Gaps:
+class Gaps(Candidates):
     """Candidates of contact at one configuration; rows are candidates, in no order of size."""
 
     def __init__(
         self, cores: Cores, places: CorePlaces, found: Candidates, transforms: FloatArray, reach: float, own: bool
     ) -> None:
         """Take candidates, transforms of obstacles to the world, shape (n, 4, 4), reach [m]; may the robot touch itself?"""
-        self.capsules, self.obstacles, self.features = found.capsules, found.obstacles, found.features
-        """Capsule, obstacle and feature of each candidate, shape (m,), integers. Numbers of obstacles beyond the last are
-        capsules of the robot itself: the number less that of obstacles."""
-        keys = zip(found.capsules.tolist(), found.obstacles.tolist(), found.features.tolist(), strict=True)
+        super().__init__(found.parts, found.given)
+        keys, self._rows = self.plain
         self.keys: tuple[tuple[int, int, int], ...] = tuple(keys)
-        """The same of each candidate: what stays the same from one configuration to the next."""
-        self.core_points, self.normals = found.points, found.normals
-        """Material points of the cores, and normals from obstacle to robot, shape (m, 3)."""
-        self.radii: FloatArray = cores.radii.take(found.capsules)
-        """Radii of the capsules, shape (m,) [m]."""
-        self.distances: FloatArray = found.distances
-        """Distances of the core points from the obstacles, shape (m,) [m]."""
-        self.values: FloatArray = found.distances - self.radii
+        """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next. Numbers of
+        obstacles beyond the last are capsules of the robot itself: the number less that of obstacles."""
+        plain = found.given is self.plain
+        capsules = np.array([key[0] for key in keys], dtype=np.intp) if plain else self.capsules
+        distances = np.array([row[1] for row in self._rows]) if plain else self.distances
+        self.values: FloatArray = distances - cores.radii.take(capsules)
         """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
-        self._cores, self.places, self.parts, self._transforms, self.reach = cores, places, found.parts, transforms, reach
+        self._cores, self.places, self._transforms, self.reach = cores, places, transforms, reach
         self.with_itself = own
         """Whether the robot may touch itself."""
-        self.moves: FloatArray = cores.moves.take(found.capsules, 0)
+        self.moves: FloatArray = cores.moves.take(capsules, 0)
         """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
 
         Where the robot touches itself, less that of the other capsule."""
         if own:
-            rows = (found.obstacles >= len(transforms)).nonzero()[0]
-            self.moves[rows] -= cores.moves[found.obstacles[rows] - len(transforms)]
-        self._plain = found.points.tolist(), found.normals.tolist()
-        wrenches = np.array([(*n, *times(point, n)) for point, n in zip(*self._plain, strict=True)]).reshape(-1, 6)
+            rows = (self.obstacles >= len(transforms)).nonzero()[0]
+            self.moves[rows] -= cores.moves[self.obstacles[rows] - len(transforms)]
+        wrenches = np.array([(*normal, *times(point, normal)) for point, _, normal in self._rows]).reshape(-1, 6)
         self.jacobian: FloatArray = wrenches.dot(places.jacobian) * self.moves
         """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
 
     def __len__(self) -> int:
         """Number of candidates."""
         return len(self.values)
+
+    @property
+    def radii(self) -> FloatArray:
+        """Radii of the capsules, shape (m,) [m]."""
+        return np.asarray(self._cores.radii.take(self.capsules))
 
     @property
     def transforms(self) -> FloatArray:
@@ -134,8 +134,7 @@ class Gaps:
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
             return self._cores.no_load
-        count, values, (points, normals) = len(self._transforms), forces.tolist(), self._plain
-        points = points if normal else self.points.tolist()
+        count, values, surface = len(self._transforms), forces.tolist(), None if normal else self.points.tolist()
         loads: list[Any] = []
         angular: list[float] = []  # rows of six, joined
         by_force: list[float] = []
@@ -143,8 +142,12 @@ class Gaps:
         own: list[int] = []
         for row in rows.tolist():
             capsule, other, _ = self.keys[row]
-            force = [values[row] * one for one in normals[row]] if normal else values[row]
-            loads.append((capsule, force, points[row]))
+            point, _, (a, b, c) = self._rows[row]
+            if surface is None:
+                force = values[row] * a, values[row] * b, values[row] * c
+            else:
+                point, force = surface[row], values[row]
+            loads.append((capsule, force, point))
             if other >= count:  # the other capsule takes the opposite force
                 depth = float(self._cores.radii[other - count]) if normal else 0.0
                 point = self.core_points[row] - (self.distances[row] + depth) * self.normals[row]
@@ -174,15 +177,7 @@ class Gaps:
             torque = np.add.reduce(wrenches * moves.take([capsule for capsule, _, _ in loads], 0))
         if normal and own:
             factors = np.concatenate([factors, self._curved_by_itself(own, forces)], axis=1)
-        return JointLoad(
-            torque=torque,
-            angular=factors[0],
-            by_force=factors[1],
-            by_moment=None,
-            gravity_derivative=None,
-            potential=potential,
-            scale=self.reach * size,
-        )
+        return JointLoad(torque, factors[0], factors[1], None, None, potential, self.reach * size)
 
     def bends(self, row: int) -> Bends:
         """Second derivative of the distance of a candidate from its obstacle."""
@@ -191,8 +186,8 @@ class Gaps:
         while place >= len(which):
             place -= len(which)
             field, which = next(parts)
-        points, normals = self._plain
-        return field.bends(int(which[place]), points[row], float(self.distances[row]), normals[row])
+        point, distance, normal = self._rows[row]
+        return field.bends(int(which[place]), point, distance, normal)
 
     def _curved(self, row: int, force: float) -> list[tuple[Any, float]]:
         r"""What the derivative of a normal force [N] of an obstacle has beside that of a dead one.
@@ -200,10 +195,11 @@ class Gaps:
         Returns:
             Wrenches, force first, and weights `w` [N/m]: it is :math:`\sum w\,a^T a` with the torques `a` of the wrenches.
         """
-        point, normal, bends = self._plain[0][row], self._plain[1][row], self.bends(row)
+        (point, _, normal), bends = self._rows[row], self.bends(row)
         found: list[tuple[Any, float]] = [((*way, *times(point, way)), force * weight) for way, weight in bends]
-        if bends and self.features[row] == INSIDE:
-            span: Any = self.places.spans[self.capsules[row]].tolist()
+        capsule, _, feature = self.keys[row]
+        if bends and feature == INSIDE:
+            span = self.places.span(capsule)
             shares = [weight * inner(way, span) for way, weight in bends]
             x, y, z = (sum(share * way[k] for share, (way, _) in zip(shares, bends, strict=True)) for k in range(3))  # H t
             bend = inner((x, y, z), span)
@@ -217,11 +213,11 @@ class Gaps:
         found: list[FloatArray] = []
         weights: list[float] = []
         for row in rows:
-            pair = int(self.capsules[row]), int(self.obstacles[row]) - len(self._transforms)
+            capsule, other, feature = self.keys[row]
+            pair = capsule, other - len(self._transforms)
             distance = float(self.distances[row] + self._cores.radii[pair[1]])
-            slides = bool(self.features[row] == INSIDE)
             point, normal = self.core_points[row], self.normals[row]
-            new, each = relative_curvature(self._cores, self.places, pair, point, normal, distance, slides)
+            new, each = relative_curvature(self._cores, self.places, pair, point, normal, distance, feature == INSIDE)
             found += new
             weights += [float(forces[row]) * weight for weight in each]
         return np.array([(np.array(found).T * weights).T, found])
@@ -282,8 +278,12 @@ class Surroundings:
 
     def pair(self, gaps: Gaps, place: int) -> tuple[str, str, bool]:
         """Link of a candidate; its obstacle, or other link; and whether that is a link."""
-        other = int(gaps.obstacles[place])
-        return self._links[gaps.capsules[place]], self._names[other], other >= len(self._transforms)
+        capsule, other, _ = gaps.keys[place]
+        return self.link(capsule), self._names[other], other >= len(self._transforms)
+
+    def link(self, capsule: int) -> str:
+        """Link of a capsule."""
+        return self._links[capsule]
 
     def at(self, q: FloatArray, margin: float) -> Gaps:
         """Return the candidates of contact.

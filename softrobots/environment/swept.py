@@ -20,8 +20,10 @@ from softrobots.environment.obstacles import Box, Capsule, Cylinder, Obstacle, S
 _SHARE = 0.25
 
 
-def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Callable[[float], Gaps]) -> bool:
-    """Whether a robot may have passed through an obstacle, or through itself, on a straight way.
+def may_pass(
+    before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Callable[[float], Gaps]
+) -> tuple[int, int, float] | None:
+    """Find what may have passed through an obstacle, or through the robot itself, on a straight way.
 
     One that grows cannot: it is on the way that it went.
 
@@ -30,6 +32,10 @@ def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Calla
         now: The robot, of as many capsules, and the obstacles after the step.
         obstacles: The obstacles.
         near: The candidates before the step, of gaps up to that given [m].
+
+    Returns:
+        Capsule, obstacle (their number, where it is the robot itself) and way [m] of what moves farthest of all that may have
+        passed; None if nothing may.
     """
     radii, ends = now.capsule_radii, before.places.ends
     rooms = _SHARE * (np.array([inner_radius(one) for one in obstacles])[:, None] + radii)
@@ -41,10 +47,12 @@ def may_pass(before: Gaps, now: Gaps, obstacles: Iterable[Obstacle], near: Calla
         ways, rooms = np.vstack([ways, way + way.max()]), np.vstack([rooms, _SHARE * (radii + radii.min())])
     far = ways > rooms
     if not far.any():
-        return False
+        return None
     candidates, gaps = near(float(ways[far].max())), np.full(len(ways), np.inf)
     np.minimum.at(gaps, np.minimum(candidates.obstacles, len(ways) - 1), candidates.values)
-    return bool((far & (ways > gaps[:, None])).any())
+    passing = np.where(far & (ways > gaps[:, None]), ways, 0.0)
+    obstacle, capsule = divmod(int(passing.argmax()), passing.shape[1])
+    return (capsule, obstacle, float(passing.max())) if passing.any() else None
 
 
 def inner_radius(obstacle: Obstacle) -> float:

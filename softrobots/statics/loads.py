@@ -212,11 +212,11 @@ class AppliedLoad:
         for term in load.terms:
             self._terms.append((model.frame_id(term.frame), term))
             self._scale += term.norms[0] * model.reach + term.norms[1]
-        no_rows = np.zeros((0, self._nv))
-        nothing = JointLoad(np.zeros(self._nv), no_rows, no_rows, None, None, 0.0, 0.0)
-        self._heavy = load.gravity is not None and any(load.gravity)
-        self.nothing = None if self._terms or self._heavy else nothing
+        self._heavy, self.nothing = load.gravity is not None and any(load.gravity), None
         """The load where there is no wrench and no gravity; it is the same everywhere."""
+        if not (self._terms or self._heavy):
+            no_rows = np.zeros((0, self._nv))
+            self.nothing = JointLoad(np.zeros(self._nv), no_rows, no_rows, None, None, 0.0, 0.0)
 
     def at(self, q: FloatArray) -> JointLoad:
         """Torque, derivative, potential and size of the load at a finite configuration, shape (nq,)."""

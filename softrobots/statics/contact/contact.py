@@ -99,16 +99,17 @@ def contact_at(
 ) -> Contact:
     """Return the contact of a candidate, with its normal force [N], friction, shape (3,) [N], status and slip."""
     link, obstacle, with_itself = surroundings.pair(gaps, place)
-    core, normal, gap, radius = gaps.core_points[place], gaps.normals[place], float(gaps.values[place]), gaps.radii[place]
+    core, distance, normal = gaps.plain[1][place]
+    core, normal = np.array(core), np.array(normal)
     return Contact(
         link=link,
         obstacle=obstacle,
-        point=core - radius * normal,
-        obstacle_point=core - (gap + radius) * normal,
-        normal=normal.copy(),
+        point=core - gaps.capsule_radii[gaps.keys[place][0]] * normal,
+        obstacle_point=core - distance * normal,
+        normal=normal,
         normal_force=normal_force,
         force=normal_force * normal + friction,
-        gap=gap,
+        gap=float(gaps.values[place]),
         strict=status != TOUCHING,
         status=status,
         slip=slip.copy(),

@@ -19,6 +19,8 @@ EVENT = 2.0**-7
 PATIENT = 2.0**-4
 """Largest step that is tried again where Newton's method does not converge at once: halving a larger one takes less."""
 
+_LONGEST_PAUSE = 16
+
 
 class Way(Protocol):
     """What a robot follows: places 0, 1, 2, ... and all between two."""
@@ -38,7 +40,8 @@ class ContactWalk:
 
     def __init__(self, way: Way) -> None:
         """Take the way."""
-        self._way, self._share, self._least, self._waits = way, 0.25, SMALLEST, False
+        self._way, self._share, self._least, self._taken = way, 0.25, SMALLEST, PATIENT
+        self._waits, self._pause = 0, 1  # steps taken before a larger one is tried, now and after the next that fails
         self.events: list[ContactEvent] = []
         self.work = 0.0
         """Work against friction so far [J]."""
@@ -68,7 +71,8 @@ class ContactWalk:
                 self._least = min(2.0 * self._least, PATIENT)  # where one place after the other is blocked
                 self._share = self._least
             elif there is None:
-                self._share, self._waits = max(0.5 * (aim - place), self._least), True
+                self._share = max(0.5 * (aim - place), self._least)
+                self._waits, self._pause = self._pause, min(2 * self._pause, _LONGEST_PAUSE)
                 continue
             else:
                 self._least = SMALLEST
@@ -78,13 +82,17 @@ class ContactWalk:
             self._tell(here.statuses, there.statuses, self._way.parameter(aim))
             self.work += there.work
             if there.statuses != here.statuses:
-                self._share, changed, self._waits = 2.0 * (aim - place), math.inf, False
+                self._share, changed, self._waits, self._pause = 2.0 * (aim - place), math.inf, 0, 1
             else:
                 if aim >= changed:  # in a smaller step from here they stay
                     changed = math.inf
-                if not self._waits:
+                if self._waits:
+                    self._waits -= 1
+                else:
                     self._share = min(2.0 * self._share, 1.0)
-            here, place, self._waits = there, aim, False
+                if aim - place > self._taken:
+                    self._pause = 1
+            here, place, self._taken = there, aim, aim - place
         return here
 
     def _tell(self, before: dict[tuple[str, str], str], after: dict[tuple[str, str], str], parameter: float) -> None:

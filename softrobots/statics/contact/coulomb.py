@@ -70,7 +70,7 @@ def solve_step(
         while here is not None and spent < first + most:
             if _converged(step, here):
                 return here, spent
-            change = _change(here, coefficient, GAP * step.reach, forced * step.reach)
+            change = _change(here, coefficient, GAP * step.reach, forced * step.reach, halvings == 1)
             if change is None:
                 break
             if float(np.linalg.norm(change[0])) <= _STILL and _converged(step, here, forced):
@@ -89,11 +89,14 @@ def solve_step(
     return None, spent
 
 
-def _change(here: Balance, coefficient: float, none: float, forced: float) -> tuple[FloatArray, FloatArray, FloatArray] | None:
+def _change(
+    here: Balance, coefficient: float, none: float, forced: float, opens: bool
+) -> tuple[FloatArray, FloatArray, FloatArray] | None:
     """Newton's change, in which no contact is to do what others and the robot do not let it.
 
     One whose gap would be left open by more than `none` [m] is taken as open: of contacts in nearly the same place, as on both
-    sides of a joint, no motion closes all gaps. Where all close, one that sticks and would be left sliding by more than
+    sides of a joint, no motion closes all gaps. So is, if it `opens`, one that would pull: two near each other both press only
+    where the robot bends hard between them. Where all close, one that sticks and would be left sliding by more than
     `forced` [m] slips, with its friction against that.
     """
     while True:
@@ -102,9 +105,10 @@ def _change(here: Balance, coefficient: float, none: float, forced: float) -> tu
             return None
         left = np.where(laws.pressed, near.gaps + near.gradients @ change[0], 0.0)
         slid = np.where(laws.sticks[:, None], near.sliding + near.jacobian @ change[0], 0.0)
-        ways = np.linalg.norm(slid, axis=1)
-        if left.max(initial=0.0) > none:
-            kept = np.arange(len(left)) != left.argmax()
+        ways, pulls = np.linalg.norm(slid, axis=1), np.where(laws.pressed, -here.normal - change[1], 0.0)
+        worst = left if left.max(initial=0.0) > none else pulls
+        if worst is left or (opens and pulls.max(initial=0.0) > CONE * float(here.normal.max(initial=0.0))):
+            kept = np.arange(len(left)) != worst.argmax()
             laws = laws._replace(pressed=laws.pressed & kept, sticks=laws.sticks & kept, slips=laws.slips & kept)
         elif ways.max(initial=0.0) > forced:
             slips = np.arange(len(left)) == ways.argmax()

@@ -22,6 +22,7 @@ from softrobots.statics.contact.certificate import softest_motion
 from softrobots.statics.contact.convex_step import Step, contact_step, nearest_step, repairing_step
 from softrobots.statics.contact.touch import NEAR, NO_FORCES, TOUCHING, ForceTable, Touch, unmoved
 from softrobots.statics.elastic_state import ElasticProblem, ElasticState, contact_softening, largest_residual, norm
+from softrobots.statics.stability import is_positive
 
 BALANCED = 1.0
 """Error of an equilibrium, see `Near.error`."""
@@ -78,8 +79,9 @@ class ContactSearch:
         touch = state.touch
         if touch is None or not math.isfinite(state.energy):
             return None
-        pressed = touch.gaps.values.take(touch.forces.nonzero()[0])
-        gap = max(touch.penetration, *pressed.tolist()) if len(pressed) else touch.penetration
+        gap = touch.penetration
+        for value, force in zip(touch.gaps.values.tolist(), touch.forces.tolist(), strict=True):
+            gap = max(gap, value) if force else gap
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
         error, apart = state.error / allowed, gap / (_EXACT * self._reach)
         if error <= BALANCED < apart:
@@ -112,7 +114,7 @@ class ContactSearch:
         touch, tangent, limits = here.touch, here.state.tangent, (_LARGEST_STEP, self._damping)
         gaps, held = touch.gaps.values, touch.forces > 0.0
         found = contact_step(tangent, here.load, gaps, touch.rows, held, self._soft, limits, self._factors)
-        if found is None or np.count_nonzero(held) or not np.count_nonzero(found.forces):
+        if found is None or np.count_nonzero(touch.forces) or not np.count_nonzero(found.forces):
             return found
         tangent = tangent - contact_softening(here.state, found.forces)  # the first forces: how they soften counts, too
         held = found.forces > 0.0
@@ -147,6 +149,8 @@ class ContactSearch:
         Of two signs that are free the one with the positive largest component is taken, so that results repeat.
         """
         state, touch = here.state, here.touch
+        if is_positive(self.problem.model, state.tangent, self._factors, times=2.0):  # on all motions
+            return True, None
         allowed = largest_residual(self.problem.model, state.scale, self.problem.tolerance)
         curvature, motion = softest_motion(state.tangent, self._stiffness, touch, self._reach, allowed)
         if curvature > -POSITIVE or not math.isfinite(curvature):

@@ -18,7 +18,16 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_path import ContactJump, ContactPath
 from softrobots.statics.contact.contact_walk import ContactWalk
 from softrobots.statics.contact.last_state import Given
-from softrobots.statics.contact.quasi_static import Rest, at_rest, carried_over, change, energy_drop, move_to_rest, step
+from softrobots.statics.contact.quasi_static import (
+    Rest,
+    at_rest,
+    carried_over,
+    change,
+    energy_drop,
+    move_to_rest,
+    obstructed,
+    step,
+)
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.statics.equilibrium_result import Equilibrium, check_same_model
 from softrobots.statics.loads import Load
@@ -79,7 +88,7 @@ def follow_contact(
     """
     course = Course(model, q_motors, {"force": force, "wrench": wrench, "gravity": gravity}, frame, environment, parameters)
     coefficient = non_negative_number("friction", friction)
-    driven = _Driven(course.at, course.parameter, allow_jumps)
+    driven = _Driven(course.at, course.parameter, course.where, allow_jumps)
     walk, ended = ContactWalk(driven), ""
     rows: list[Equilibrium] = []
     worked: list[float] = []
@@ -156,6 +165,11 @@ class Course:
         """Parameter at a place: a number of a row, or between two."""
         return float(np.interp(place, np.arange(len(self.parameters)), self.parameters))
 
+    def where(self, place: float) -> str:
+        """Return a place in words."""
+        row = min(int(place), len(self.parameters) - 2)
+        return f"between rows {row} and {row + 1}, at parameter {self.parameter(place):.6g},"
+
     def at(self, place: float) -> Given:
         """Return what is given at a place."""
         parameter = self.parameter(place)
@@ -173,8 +187,14 @@ class Course:
 class _Driven:
     """A robot that is driven from place to place, and snaps where it cannot follow; a `contact_walk.Way`."""
 
-    def __init__(self, given_at: Callable[[float], Given], parameter: Callable[[float], float], allow_jumps: bool) -> None:
-        self._given_at, self.parameter, self._allow_jumps = given_at, parameter, allow_jumps
+    def __init__(
+        self,
+        given_at: Callable[[float], Given],
+        parameter: Callable[[float], float],
+        where: Callable[[float], str],
+        allow_jumps: bool,
+    ) -> None:
+        self._given_at, self.parameter, self._where, self._allow_jumps = given_at, parameter, where, allow_jumps
         self.jumps: list[ContactJump] = []
         self.ended = ""
 
@@ -195,7 +215,8 @@ class _Driven:
         rest = move_to_rest(given, here)
         if rest is None:
             raise EquilibriumNotFound(
-                f"at parameter {parameter:.6g} the robot leaves its equilibrium, and its overdamped motion comes to no rest",
+                f"{self._where(place)} the robot leaves its equilibrium, and its overdamped motion comes to no rest"
+                + obstructed(given, here),
                 best=None,
                 residual=float("nan"),
                 iterations=0,
@@ -222,7 +243,8 @@ def _first(course: Course, friction: float, start: Equilibrium | None) -> Rest:
 
         rest = at_rest(loaded(0.0), here, friction)
         if rest is not None:
-            rest = ContactWalk(_Driven(loaded, lambda _: course.parameter(0.0), True)).go(rest, 0.0)
+            there = _Driven(loaded, lambda _: course.parameter(0.0), "at the first row, under {:.3g} of its load,".format, True)
+            rest = ContactWalk(there).go(rest, 0.0)
     else:
         check_same_model(given.model, start, "start")
         if not np.allclose(start.q_motors, given.q_motors, rtol=1e-9, atol=1e-9):

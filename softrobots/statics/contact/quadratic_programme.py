@@ -53,18 +53,29 @@ def solve_guessed(
     Returns:
         As `solve_programme`; None if the guess is wrong, or the rows nearly depend on each other.
     """
+    forces: Any
     free, chosen = -factors.solve(pull).ravel(), held.nonzero()[0]  # Eigen returns one row as a matrix
     lacking, multipliers = bounds - gradients.dot(free), np.zeros(len(bounds))
     if not len(chosen):
         chosen = lacking.argmax(keepdims=True) if len(bounds) else chosen
         if not len(bounds) or lacking[chosen[0]] <= 0.0:
             return free, multipliers
-    rows = gradients.take(chosen, 0)
-    gives = factors.solve(rows.T).reshape(len(free), -1)
-    forces = _independent(rows.dot(gives), lacking.take(chosen))
-    if forces is None or min(forces.tolist()) < 0.0:
-        return None
-    solution, multipliers[chosen] = free + gives.dot(forces), forces
+    if len(chosen) == 1:
+        row = gradients[chosen[0]]
+        gives = factors.solve(row).ravel()
+        give = float(row.dot(gives))
+        forces = float(lacking[chosen[0]]) / give if give > 0.0 else -1.0
+        if forces < 0.0:
+            return None
+        solution = free + forces * gives
+    else:
+        rows = gradients.take(chosen, 0)
+        gives = factors.solve(rows.T).reshape(len(free), -1)
+        forces = _independent(rows.dot(gives), lacking.take(chosen))
+        if forces is None or min(forces.tolist()) < 0.0:
+            return None
+        solution = free + gives.dot(forces)
+    multipliers[chosen] = forces
     lacking = bounds - gradients.dot(solution)
     lacking[chosen] = 0.0
     if max(lacking.tolist()) > 0.0 and (lacking > _BROKEN * np.sqrt(np.vecdot(gradients, gradients))).any():
@@ -74,8 +85,6 @@ def solve_guessed(
 
 def _independent(matrix: FloatArray, right: FloatArray) -> FloatArray | None:
     """Solve with the matrix of the products of some rows; None if they nearly depend on each other."""
-    if len(right) == 1:
-        return right / matrix[0] if matrix[0, 0] > 0.0 else None
     sizes = np.sqrt(np.maximum(matrix.diagonal(), 1e-300))
     values, vectors = np.linalg.eigh(matrix / sizes / sizes[:, None])
     return (vectors @ ((vectors.T @ (right / sizes)) / values)) / sizes if values[0] > _INDEPENDENT else None

@@ -104,16 +104,16 @@ def step(given: Given, last: Rest, *, patient: bool = True) -> Rest | None:
     """
     sliding, start = carried_over(given, last)
     there = settle(given, sliding, start, patient=patient)
-    if there is None or change(given.model, there.q_springs, start) > FAR or _through(there, sliding, last):
+    if there is None or change(given.model, there.q_springs, start) > FAR or may_have_passed(there.robot, last):
         return None
     return there
 
 
-def _through(there: Rest, sliding: Sliding, last: Rest) -> bool:
-    """Whether the robot may have passed through an obstacle since a rest, whose surfaces are those of `sliding`."""
-    now, before = there.robot, last.robot
+def may_have_passed(now: SlidingRobot, last: Rest) -> tuple[int, int, float] | None:
+    """Find what of the robot, where it was asked last, may have passed through an obstacle since a rest; None if nothing."""
+    before, surfaces = last.robot, now.last.gaps
     return may_pass(
-        sliding.gaps,
+        surfaces,
         now.at.gaps,
         now.given.environment,
         lambda margin: before.given.surroundings.at(before.at.q, margin),
@@ -131,7 +131,7 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
     for _ in range(_MOST_MOMENTS):
         there = settle(given, sliding, here, brake) or settle(given, let_go(sliding), here, brake)
         moved = np.inf if there is None else change(model, there.q_springs, here)
-        if there is None or moved > _FAR_MOVING or _through(there, sliding, state):
+        if there is None or moved > _FAR_MOVING or may_have_passed(there.robot, state):
             brake *= 4.0
             if brake > _STRONGEST:
                 return None
@@ -146,6 +146,25 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
                 here, brake = here + _PUSH * there.robot.softest(there.found)[1], 1.0
             brake *= 0.5
     return None
+
+
+def obstructed(given: Given, last: Rest) -> str:
+    """What keeps a robot from following what is given from a rest, in words, after a semicolon; empty if nothing is near."""
+    sliding, start = carried_over(given, last)
+    robot = SlidingRobot(given, sliding)
+    if robot.contacts(start) is None:
+        return ""
+    gaps, surroundings = robot.at.gaps, given.surroundings
+    passed = may_have_passed(robot, last)
+    if passed is not None:
+        capsule, obstacle, way = passed
+        name = (*given.environment.names, "the robot itself")[obstacle]
+        what = f"{surroundings.link(capsule)!r} and {name!r} move by {way:.3g} m against each other at once"
+        return f"; {what}: motors and poses must lead there in smaller steps, or give more rows"
+    if not len(gaps):
+        return ""
+    link, other, _ = surroundings.pair(gaps, int(gaps.values.argmin()))
+    return f"; {link!r} is at {other!r}: move robot or obstacle less far, or by another way"
 
 
 def let_go(last: Sliding) -> Sliding:

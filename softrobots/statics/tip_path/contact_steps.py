@@ -29,7 +29,7 @@ from softrobots.statics.contact.contact_path import ContactPath
 from softrobots.statics.contact.contact_walk import ContactWalk
 from softrobots.statics.contact.last_state import Given, Sliding
 from softrobots.statics.contact.newton_in_contact import ByMotors, followed
-from softrobots.statics.contact.quasi_static import FAR, Rest, at_rest, change, settle, step
+from softrobots.statics.contact.quasi_static import FAR, Rest, at_rest, change, may_have_passed, obstructed, settle, step
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_goal import Goal
@@ -163,7 +163,8 @@ class TargetWay:
             tip = RubbingTip(self.given(here.q_motors), here.sliding, goal)
             local = tip.solve(here.q_motors, here.q_springs)
             if local is not None and local.arrived(self._tolerance):
-                return local.state._replace(work=work + local.state.work)
+                passed = may_have_passed(local.state.robot, here)
+                return None if passed else local.state._replace(work=work + local.state.work)
             wanted = None if local is None else self._wanted(tip, local)
             if local is None or wanted is None:
                 return None
@@ -175,7 +176,8 @@ class TargetWay:
                 found = self._least(tip, here.q_motors, found)
                 turn, far = found.q_motors - here.q_motors, self._far(found.state.q_springs - here.q_springs)
                 if far <= 1.0:
-                    return found.state._replace(work=work + found.state.work)
+                    passed = may_have_passed(found.state.robot, here)
+                    return None if passed else found.state._replace(work=work + found.state.work)
             part = self._model.actuators.go(here.q_motors, min(0.5, 0.5 / far) * turn)
             turned = step(self.given(part), here)
             if turned is None or not np.any(part != here.q_motors):
@@ -241,7 +243,7 @@ class TargetWay:
         raise TargetUnreachable(
             f"waypoint {number} of {len(self._goals)}: with friction no small step leads nearer from where the tip is "
             f"{left:.6g} m from it, with motors {best.q_motors.round(6).tolist()}"
-            + (f"; {', '.join(held)}, also when pressed less" if held else ""),
+            + (f"; {', '.join(held)}, also when pressed less" if held else obstructed(here.robot.given, here)),
             best=best,
             residual=left,
             iterations=best.iterations,
