@@ -11,6 +11,9 @@ MOTION_ROUNDING = 1e-10
 MOTION_CORRECTIONS = 30
 """Largest number of corrections of a step of time; then it is halved."""
 
+MOTION_LEFT = 1e-9
+"""Change by the last of them, below which it is not halved, as in `softrobots.dynamics.midpoint`."""
+
 RENEW_SHARE = 0.2
 """Share of the last change, above which the factors of a step are computed again: tendons go slack, or the body swings far."""
 
