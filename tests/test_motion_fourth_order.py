@@ -83,7 +83,7 @@ def test_compiled_steps_are_those_of_simulate(kind: str) -> None:
 
 @pytest.mark.study
 def test_a_slender_rod_swings_far_by_the_steps_of_simulate() -> None:
-    """Undamped, released upright from a sideways force of four times its weight; twists hardly move, and settle slowly.
+    """Undamped, released upright from a sideways force of six times its weight; twists hardly move, and settle slowly.
 
     A step may leave 1e-9 rad in either engine; one that is halved in one of them alone differs by 1e-3 rad.
     """
