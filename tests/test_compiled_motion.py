@@ -406,3 +406,23 @@ def test_numba_takes_the_same_steps(solver: CompiledModel, arm: SoftModel) -> No
     np.testing.assert_allclose(found.tip_position, expected.tip_position, rtol=0, atol=1e-11)
     many = fast.simulations(0.1, [swaying, swaying], forces=[gust, gust], **given)
     np.testing.assert_allclose(many.tip_position[1], expected.tip_position, rtol=0, atol=1e-11)
+
+
+@pytest.mark.parametrize("least", [4, 10**9])
+def test_chosen_steps_go_on_to_shorter_ones_where_long_ones_fail(least: int) -> None:
+    """Runs of less than `least` steps fail, others have an error of second order; a few failures in a row are the end."""
+    runs: list[int] = []
+
+    def take(grid: np.ndarray) -> motion_runs.StepsTaken:
+        runs.append(len(grid) - 1)
+        rows = np.full((1, 1, 3), (1.0 / runs[-1] ** 2, 0.0, 0.0) if runs[-1] >= least else np.nan)
+        return motion_runs.StepsTaken(grid, rows, np.array([Status.CERTIFIED if runs[-1] >= least else Status.UNSETTLED]))
+
+    taken = motion_runs.halve_to_tolerance(take, np.linspace(0.0, 1.0, 2), 1e-3, 2)
+    assert (taken.status[0] == Status.CERTIFIED) == (least == 4)
+    if least == 4:
+        assert taken.errors is not None
+        assert 1.0 / runs[-1] ** 2 <= taken.errors[0] <= 1e-3
+        assert taken.is_within
+    assert runs == [2**power for power in range(len(runs))]
+    assert len(runs) < 8

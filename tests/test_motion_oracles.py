@@ -231,6 +231,7 @@ def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
 
 
 @pytest.mark.study
+@pytest.mark.timeout(1800)
 @pytest.mark.shortened(3, 200)
 def test_random_pulses_and_moving_motors_keep_their_energy(cases: int) -> None:
     """Loads that jump at round times, motors that move, steps that are chosen, both engines: the tip agrees, energy is kept."""

@@ -11,11 +11,11 @@ MOTION_ROUNDING = 1e-10
 MOTION_CORRECTIONS = 30
 """Largest number of corrections of a step of time; then it is halved."""
 
-SLOW_TENDONS = 0.2
-"""Share of the last change, above which the factors of a step are computed again with actuators on routes: some go slack."""
+MOTION_LEFT = 1e-9
+"""Change by the last of them, below which it is not halved, as in `softrobots.dynamics.midpoint`."""
 
-NEVER = 1e300
-"""The same for others: never."""
+RENEW_SHARE = 0.2
+"""Share of the last change, above which the factors of a step are computed again: tendons go slack, or the body swings far."""
 
 LEAST_PART = 2.0**-12
 """Smallest part of a step of time."""

@@ -89,7 +89,6 @@ MOTORS_MIDDLE: int
 N_HISTORY: int
 POSITION: int
 RATE: int
-RENEW_SHARE: float
 SETTLED: int
 SHARE: int
 TIME_STEP: int

@@ -40,7 +40,7 @@ def settle_middle(w: Array) -> bool:
             motion_factor(w)
         else:
             motion_correct(w)
-    return False
+    return w[CHANGE] < MOTION_LEFT
 
 
 def motion_step(w: Array) -> int:

@@ -98,6 +98,8 @@ class MotionLayout:
     """Largest change of an unknown in the middle of the step by the last correction, by `scale`."""
     last_change: int = field(init=False)
     """The same of the correction before."""
+    change_before: int = field(init=False)
+    """The same of the one before that."""
     settled: int = field(init=False)
     """1 where the corrections have converged, 0 where they have not."""
     failed: int = field(init=False)
@@ -128,7 +130,7 @@ class MotionLayout:
             history=KEPT_DIFFERENCES * k * n, sizes=KEPT_DIFFERENCES, weights=KEPT_DIFFERENCES, n_history=1, last_step=1
         )
         path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1)
-        search = dict(scale=n, change=1, last_change=1, settled=1, failed=1)
+        search = dict(scale=n, change=1, last_change=1, change_before=1, settled=1, failed=1)
         stages = dict(stages=(k - 1) * 2 * n, forces=k * (self.strains or 0) if k == 2 or full else 0)
         assign_places(self, m, **given, **middle, **state, **before, **path, **search, **stages, prepared=0)
 

@@ -39,7 +39,6 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order
     values: dict[str, object] = {name: value for name, value in vars(motion_settings).items() if name.isupper()}
     values |= layout.constants()
     values |= {"WORKSPACE_SIZE": parts.size, "LANE_SIZE": parts.size, "LANES": lane_count(parts.size)}
-    values["RENEW_SHARE"] = motion_settings.SLOW_TENDONS if plan.unknowns.routed else motion_settings.NEVER
     values |= {status.name: status.value for status in _STATUSES} | parts.constants
     text = module_text(docstring, values, blocks, parts.loops, functions_of(motion_drivers))
     batches = lane_text(blocks, parts.lane_loops, [load_block, load_case, *functions_of(motion_lane_drivers)])

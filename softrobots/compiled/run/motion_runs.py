@@ -86,6 +86,9 @@ def halve_to_tolerance(
         errors = np.linalg.norm(now.rows[..., -3:] - before.rows[..., -3:], axis=2).max(axis=1, initial=0.0)
         errors = np.where(before.status == Status.CERTIFIED, errors, np.inf)
         counts = (now.status == Status.CERTIFIED) & ~np.asarray(bad)
+        if not np.any(counts) and not np.all(bad) and len(history) <= _STALLED and 2 * len(grid) <= MOST_STEPS:
+            history, before = [*history, math.inf], now  # long steps may fail where shorter ones do not
+            continue
         furthest = float(errors[counts].max(initial=0.0))
         errors *= error_share(last, furthest, order)
         now, last = replace(now, errors=np.where(counts, errors, np.inf)), furthest

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.drivers.lane_drivers import Places, Rows
-from softrobots.compiled.motion_settings import MOTION_CORRECTIONS
+from softrobots.compiled.motion_settings import MOTION_CORRECTIONS, RENEW_SHARE
 from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.settings import CHUNK, FORCE_PASSES, OBSERVABLE, PASSES
 from softrobots.compiled.statuses import Status
@@ -211,7 +211,7 @@ class MotionBatches:
             settled = w[layout.settled] > 0.5
             if np.all(settled | failed):
                 break
-            slow = bool(np.any((w[layout.change] > self._alone.RENEW_SHARE * w[layout.last_change]) & ~settled & ~failed))
+            slow = bool(np.any((w[layout.change] > RENEW_SHARE * w[layout.last_change]) & ~settled & ~failed))
             w[layout.last_change] = w[layout.change]
         for i in range(layout.unknowns):
             functions.finish_unknown(w, i)

@@ -36,10 +36,19 @@ _CHECKS = """\
 #pragma GCC optimize("no-ivopts")
 #endif"""
 
+_APART = """\
+/* Both rounds of such a loop have places of their own: none reads what the other one writes. */
+#if defined(__GNUC__) && !defined(__clang__)
+#define ROUNDS_APART _Pragma("GCC ivdep")
+#else
+#define ROUNDS_APART
+#endif"""
+
 
 class C(Dialect):
     """C99."""
 
+    rounds_apart = "ROUNDS_APART"
     reserved = """
 auto break case char const continue default do double else enum extern float for goto if inline int long register restrict
 return short signed sizeof static struct switch typedef union unsigned void volatile while asm typeof linux unix
@@ -116,6 +125,7 @@ def to_c(text: str, *, prefix: str, exported: Sequence[str]) -> str:
         "#include <float.h>\n#include <limits.h>"
         + ("\n#include <stdint.h>" if needed.intersection(_NEED_WIDE_INTEGERS) else ""),
         _CHECKS,
+        _APART if any(C.rounds_apart in body for body in bodies) else "",
         "\n".join(_constants(module, prefix, needed)),
         "\n".join(line for head in heads.values() for line in wrapped(f"{head};")),
         *(function.replace("PREFIX_", prefix) for name, function in _intrinsics().items() if name in needed),

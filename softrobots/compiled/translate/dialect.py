@@ -35,6 +35,8 @@ class Dialect(ABC):
     """Prefix of the names at the level of the file."""
     reserved: Sequence[str]
     """Keywords, which no parameter or local may be."""
+    rounds_apart = ""
+    """What stands before a loop over both stages of a step, whose rounds read nothing that the other one writes."""
 
     @abstractmethod
     def head(self, function: Function, *, external: bool) -> str:

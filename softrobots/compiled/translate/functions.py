@@ -178,6 +178,8 @@ class FunctionWriter:
             bound = f"stop_{self._bounds}"
             self._lines.append(f"{indent}{self._dialect.declaration('int', constant=True)}{bound} = {parts[-1].text};")
         self.scope.kinds[name] = "int"
+        if name == "stage" and self.scope.known_int(limits[-1]) == 2 and all(isinstance(one, ast.Assign) for one in node.body):
+            self._lines.extend(f"{indent}{line}" for line in self._dialect.rounds_apart.splitlines())
         self._lines.append(
             f"{indent}for ({self._dialect.declaration('int')}{name} = {start}; {name} < {bound}; {name} += 1) {{"
         )
