@@ -18,6 +18,7 @@ import pinocchio as pin
 
 import softrobots as sr
 from softrobots import inflated_beam
+from softrobots.compiled.run.motion_batch import MotionBatch
 from softrobots.compiled.sweeps import TargetGrid, WorkspaceMap, map_workspace
 from softrobots.core.checkpoint import CASE, Checkpoint
 from softrobots.core.yaml_text import parse_yaml
@@ -317,6 +318,8 @@ def results() -> dict[str, Any]:
         "motion": sr.simulate(
             model, 0.02, (0.3, 0.6, -0.8), start=held, gravity=(0, 0, -9.81), time_step=0.01, output_step=0.01
         ),
+        "motion_batch": sr.compile(model, backend="python").simulations(0.02, [(0.3, 0.6, -0.8)] * 2, time_step=0.01),
+        "linear_model": sr.linearize(model, held),
         "measurements": sr.Measurements(
             np.array([[0.1, 0.2], [0.3, 0.4]]), tip_position=[[1.0, 2.0, np.nan], [3.0, 4.0, 5.0]], std=0.1, labels=["a", "b"]
         ),
@@ -357,6 +360,12 @@ def read_result(file: Path) -> None:
         return
     if isinstance(result, sr.Motion):
         finite(result.time, result.q_springs, result.velocities, result.tip_position, result.energy.balance)
+        return
+    if isinstance(result, MotionBatch):
+        finite(result.q_springs, result.velocities, result.tip_position)
+        return
+    if isinstance(result, sr.LinearModel):
+        finite(result.A, result.B, result.C, result.D)
         return
     if isinstance(result, WorkspaceMap):
         finite(result.payload, result.q_motors, result.q_springs)
