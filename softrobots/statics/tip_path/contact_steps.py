@@ -191,13 +191,12 @@ class TargetWay:
 
     def _wanted(self, tip: RubbingTip, here: LocalSolution[Rest]) -> tuple[FloatArray, float] | None:
         """What the motors turn to the goal by the first linear model that leads there, and how far the springs then move."""
-        basis = self._model.actuators.basis
+        basis, scale = self._model.actuators.basis, self._model.motor_scale.max()
         with contextlib.suppress(NeutralEquilibrium):
             for model in tip_models(tip, here):
-                left, sizes, right = np.linalg.svd(model.slope @ basis * self._model.motor_scale.max(), full_matrices=False)
+                left, sizes, right = np.linalg.svd(model.slope @ basis * scale, full_matrices=False)
                 moves = sizes > _NO_MOTION * self._model.reach
-                turn = right[moves].T @ ((left[:, moves].T @ model.missing) / sizes[moves])
-                turn = basis @ turn * self._model.motor_scale.max()
+                turn = scale * basis @ (right[moves].T @ ((left[:, moves].T @ model.missing) / sizes[moves]))
                 if np.linalg.norm(model.missing - model.slope @ turn) <= 0.5 * np.linalg.norm(model.missing):
                     return turn, self._far(model.shift + model.follow @ turn)
         return None
