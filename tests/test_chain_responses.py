@@ -36,10 +36,11 @@ def test_compiled_derivatives_are_those_of_pinocchio(kind: str) -> None:
     own, other = (one.pull(inputs, results, weights, [(3,), (), ()]) for one in (solver, plain))
     for a, b in zip(own, other, strict=True):  # the results are in balance to 1e-12, the numbers of winding lengths by it
         assert a == pytest.approx(b, rel=1e-9, abs=1e-9 * np.abs(b).max(initial=0.0))
-    for given in ([rates[0], rates[1], None], [None, rates[1], None], rates):
+    # rates by parameters are differences of numbers: the order of sums in the code moves those of winding lengths by some 1e-9
+    for given, near in (([rates[0], rates[1], None], 1e-9), ([None, rates[1], None], 1e-9), (rates, 1e-8)):
         own, other = (one.push(inputs, results, given) for one in (solver, plain))
         for a, b in zip(own, other, strict=True):
-            assert a == pytest.approx(b, rel=1e-9, abs=1e-9 * np.nanmax(np.abs(b)), nan_ok=True)
+            assert a == pytest.approx(b, rel=near, abs=near * np.nanmax(np.abs(b)), nan_ok=True)
 
 
 CHAINS: dict[str, Any] = {"stacked": ROBOTS["stacked"], "on_an_arm": ROUTED["on_an_arm"], "lumped": ROUTED["lumped"]}

@@ -144,7 +144,7 @@ def test_models_solutions_and_movements_are_drawn() -> None:
         sr.plot(3)  # type: ignore[arg-type]
 
 
-UNDRAWN = {"characterisation", "measurements"}
+UNDRAWN = {"characterisation", "linear_model", "measurements", "motion_batch"}
 """Kinds of results that have no figure of their own: that of a characterisation needs its data."""
 
 

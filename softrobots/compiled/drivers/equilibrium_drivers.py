@@ -98,11 +98,14 @@ def search_line(w: Array, longest: float, least: float) -> bool:
 
     The step is doubled while the energy falls and it stays shorter than `longest`. With given muscle lengths the energy counts
     their gap to second order only, and near the equilibrium its own decrease is smaller than that: there a Newton step at a
-    stable point is taken, too, if it halves the residual; all that were before, whose `least` is squared, as it may rise again.
+    stable point is taken, too, if it halves the residual. With friction it halves the `least` one so far, which is squared like
+    all: at the kinks of friction the residual may rise again and again.
     """
     halved = 0.0
     if N_CONSTRAINTS > 0 and is_stable(w):
-        halved = 0.25 * least
+        halved = 0.25 * w[ERROR]
+        if N_SLIDERS + N_GUIDES > 0:
+            halved = 0.25 * least
     keep(w)
     energy = w[ENERGY]
     slope = w[SLOPE]
