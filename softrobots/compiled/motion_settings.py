@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-MOTION_TOLERANCE = 1e-13
+from softrobots.dynamics import midpoint
+
+MOTION_TOLERANCE = midpoint.CHANGE
 """Change of an unknown in the middle of a step of time that ends the corrections, relative to 1 rad or m or its size."""
 
 MOTION_ROUNDING = 1e-10
 """Change that may be left where corrections no longer shrink."""
 
-MOTION_CORRECTIONS = 30
+MOTION_CORRECTIONS = midpoint.ITERATIONS
 """Largest number of corrections of a step of time; then it is halved."""
 
-MOTION_LEFT = 1e-9
-"""Change by the last of them, below which it is not halved, as in `softrobots.dynamics.midpoint`."""
+MOTION_LEFT = midpoint.ROUNDED
+"""Change by the last of them, below which it is not halved."""
 
 RENEW_SHARE = 0.2
 """Share of the last change, above which the factors of a step are computed again: tendons go slack, or the body swings far."""

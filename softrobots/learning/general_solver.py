@@ -37,8 +37,7 @@ class GeneralSolver:
     def __init__(self, parameters: ParameterSet, *, weight: bool, compiled: CompiledModel | None = None) -> None:
         """Take the parameters, and compiled solvers for the equilibria of the robot as it is."""
         self._parameters, self._weight, self._compiled = parameters, weight, compiled
-        looped = compiled is not None and not compiled.unknowns.is_unrolled
-        self._varied = VariedChains(compiled, parameters) if looped and compiled is not None else None
+        self._varied = None if compiled is None or compiled.unknowns.is_unrolled else VariedChains(compiled, parameters)
         self._at, self._change = lru_cache(maxsize=16)(self._model), lru_cache(maxsize=4)(self._model_change)
 
     def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[GeneralResponses, FloatArray, FloatArray]:

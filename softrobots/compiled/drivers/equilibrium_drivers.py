@@ -93,19 +93,16 @@ def outcome(w: Array) -> int:
     return CERTIFIED
 
 
-def search_line(w: Array, longest: float, least: float) -> bool:
+def search_line(w: Array, longest: float, error: float) -> bool:
     """Search along the step for a lower energy (Armijo); tell whether it or the residual decreased.
 
     The step is doubled while the energy falls and it stays shorter than `longest`. With given muscle lengths the energy counts
     their gap to second order only, and near the equilibrium its own decrease is smaller than that: there a Newton step at a
-    stable point is taken, too, if it halves the residual. With friction it halves the `least` one so far, which is squared like
-    all: at the kinks of friction the residual may rise again and again.
+    stable point is taken, too, if it halves the residual, whose square `error` is.
     """
     halved = 0.0
     if N_CONSTRAINTS > 0 and is_stable(w):
-        halved = 0.25 * w[ERROR]
-        if N_SLIDERS + N_GUIDES > 0:
-            halved = 0.25 * least
+        halved = 0.25 * error
     keep(w)
     energy = w[ENERGY]
     slope = w[SLOPE]
@@ -166,9 +163,10 @@ def descend(w: Array) -> int:
     is halved; a short step with shifted pivots is doubled while that lowers the energy, since it hardly leaves a saddle. A
     point that is not stable and makes no progress is left like a saddle. The descent ends in a stable or neutral equilibrium
     unless there is none, a section comes to the end of its range, or the largest number of steps is reached. Where it is
-    nearly neutral the residual is made as small as it can be: the least pivot is as far from its value as that from zero.
+    nearly neutral the residual is made as small as it can be: the least pivot is as far from its value as that from zero. At
+    the kinks of dry friction the residual may rise again and again: there the least one so far counts.
     """
-    least = 1e300
+    error = 1e300
     saddles = 0
     refined = 0
     strong = 0
@@ -200,9 +198,9 @@ def descend(w: Array) -> int:
                 w[PIVOT_SHIFT] = 0.0
                 if w[LENGTH] < SHORT_STEP * SHORT_STEP:
                     longest = LARGEST_STEP
-            if w[ERROR] < least:
-                least = w[ERROR]
-            if not search_line(w, longest, least):
+            if N_SLIDERS + N_GUIDES == 0 or w[ERROR] < error:
+                error = w[ERROR]
+            if not search_line(w, longest, error):
                 if stable:
                     if not cross_valley(w):
                         break

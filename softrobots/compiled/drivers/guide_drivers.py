@@ -102,11 +102,8 @@ def settle_from(w: Array) -> int:
 
 def settle(w: Array) -> int:
     """Find the equilibrium from rest; return the status."""
-    if not is_usable(w):
-        return NOT_A_NUMBER
-    prepare(w)
     go_to_start(w)
-    return descend_rubbing(w)
+    return settle_from(w)
 
 
 def settle_batch(

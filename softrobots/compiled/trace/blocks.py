@@ -208,6 +208,11 @@ def _element(array: str, base: str, offset: int, lanes: bool) -> str:
     return f"{array}[{index}]"
 
 
+def width_of(places: Sequence[int | None]) -> int:
+    """Return how many inputs numbers of an element are, from the place of each; None of constants."""
+    return len({one for one in places if one is not None})
+
+
 class TableColumns:
     """Numbers of the elements of a kind: equal ones are constants, others go into a table.
 
@@ -247,7 +252,7 @@ class TableColumns:
     @property
     def width(self) -> int:
         """Count of numbers for one element."""
-        return len(self._columns) if self.given is None else len({one for one in self.given if one is not None})
+        return len(self._columns) if self.given is None else width_of(self.given)
 
     @property
     def numbers(self) -> list[float]:

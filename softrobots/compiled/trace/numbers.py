@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.compiled.trace.blocks import width_of
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.core.checks import FloatArray
 from softrobots.model.serial_chain import ChainBody, ChainJoint, Element, SerialChain
@@ -117,7 +118,7 @@ class TableInputs:
     @property
     def count(self) -> int:
         """Number of inputs."""
-        return sum(len(self.seen[0][name]) * _width(own) for name, (_, own) in self.columns.items())
+        return sum(len(self.seen[0][name]) * width_of(own) for name, (_, own) in self.columns.items())
 
     def values(self, tables: Mapping[str, FloatArray]) -> FloatArray | None:
         """Return the inputs of a chain, shape (count,), from its tables; None if another number differs there."""
@@ -125,7 +126,7 @@ class TableInputs:
         for name, given in self.seen[0].items():
             own, table = self.columns.get(name, (0, [None] * given.shape[1]))[1], tables[name]
             varied = np.array([one is not None for one in own], dtype=bool)
-            part, places = np.zeros((len(table), _width(own))), [one for one in own if one is not None]
+            part, places = np.zeros((len(table), width_of(own))), [one for one in own if one is not None]
             part[:, places] = table[:, varied]
             expected = given.copy()
             expected[:, varied] = part[:, places]
@@ -133,10 +134,6 @@ class TableInputs:
                 return None
             parts.append(part.ravel())
         return np.concatenate(parts)
-
-
-def _width(columns: Sequence[int | None]) -> int:
-    return len({one for one in columns if one is not None})
 
 
 def _same(one: Any, other: Any) -> Any:

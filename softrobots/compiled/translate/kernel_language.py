@@ -134,6 +134,14 @@ def read_module(text: str) -> Module:
     return module
 
 
+def is_over_stages(node: ast.For) -> bool:
+    """Whether a loop goes over both stages of a step (`softrobots.compiled.trace.blocks`): no round reads what one writes."""
+    match node:
+        case ast.For(target=ast.Name(id="stage"), iter=ast.Call(args=[ast.Constant(value=2)])):
+            return all(isinstance(one, ast.Assign) for one in node.body)
+    return False
+
+
 def _constant(module: Module, node: ast.expr) -> Number | tuple[Number, ...]:
     values = tuple(_number(module, one) for one in (node.elts if isinstance(node, ast.Tuple) else [node]))
     if len({type(value) for value in values}) != 1:

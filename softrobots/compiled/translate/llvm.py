@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from softrobots.compiled.translate.kernel_language import Function, read_module
+from softrobots.compiled.translate.kernel_language import Function, is_over_stages, read_module
 from softrobots.compiled.translate.llvm_expressions import NAMES, PAIRED, ExpressionWriter, Symbols, Value, literal
 
 
@@ -105,9 +105,7 @@ class _FunctionWriter(ExpressionWriter):
                 self.jump(inside, end, self.value(test))
                 self._round(inside, body, head, end)
                 self.begin(end)
-            case ast.For(target=ast.Name(id="stage"), iter=ast.Call(args=[ast.Constant(value=2)]), body=body) if all(
-                isinstance(one, ast.Assign) for one in body
-            ):
+            case ast.For(body=body) if is_over_stages(node):
                 self.values["stage"], self.in_pairs = literal(0), True
                 self._block(body)
                 self.in_pairs = False
