@@ -89,7 +89,7 @@ def test_version(capsys: pytest.CaptureFixture) -> None:
         (["solve", "inflatable_arm", "--method", "newtn"], "invalid choice: 'newtn' (did you mean 'newton'?)"),
         (["urdf", "inflatable_arm", "--nothing"], "unrecognized arguments: --nothing"),
         (["urdf", "inflatable_arm", "-o"], "expected one argument"),
-        (["urdf", "inflatable_arm", "--check", "three"], "unrecognized arguments: three\n"),
+        (["urdf", "inflatable_arm", "--check", "three"], "arguments: three; softrobots urdf --help explains\n"),
         (["urdf", "inflatable_arm", "--chekc"], "unrecognized arguments: --chekc (did you mean '--check'?)"),
         (["urdf", "inflatable_arm", "--over"], "unrecognized arguments: --over"),  # options in full
         (["urdf", "inflatable_arm", "radius=3"], "radius=3; parameters of the robot follow --set: --set NAME=VALUE"),
@@ -99,7 +99,7 @@ def test_version(capsys: pytest.CaptureFixture) -> None:
         (["urdf", "inflatable_arm", "--set", "=3"], "'=3': NAME=VALUE is required"),
         (["urdf", "inflatable_arm", "--set"], "expected at least one argument"),
         (["doctor", "--nothing"], "unrecognized arguments: --nothing"),
-        (["doctor", "radius=3"], "unrecognized arguments: radius=3\n"),
+        (["doctor", "radius=3"], "error: unrecognized arguments: radius=3; softrobots doctor --help explains\n"),
     ],
 )
 def test_words_that_argparse_refuses(words: list[str], message: str, capsys: pytest.CaptureFixture) -> None:
@@ -109,6 +109,7 @@ def test_words_that_argparse_refuses(words: list[str], message: str, capsys: pyt
     out, err = capsys.readouterr()
     assert out == ""
     assert message in err
+    assert err.count("\n") == 1  # without the usage, which would hide it
 
 
 COMMAND_LINES = {"command": [str(Path(sys.executable).parent / "softrobots")], "module": [sys.executable, "-m", "softrobots"]}

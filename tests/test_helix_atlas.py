@@ -108,7 +108,9 @@ def test_tables_are_printed_too(tmp_path: Path, capsys: pytest.CaptureFixture) -
     assert run_script("helix_atlas", ["--no-plots", "--output", str(folder)]) == 0
     assert {path.name for path in folder.iterdir()} == TABLES
     out = capsys.readouterr().out
+    assert "| 2.5 | 0.5 | 0.03310 | 0.06546 | 0.03236 | 0.00568 | 0.03547 | yes | yes |" in out
     assert "| 5 | 0.66 | 0.03310 | 0.08541 | 0.05231 | 0.02796 |" in out
+    assert out.count("| none |") == 8
     assert "| 2.5 | 0.4882 | 0.4871 |" in out
     assert "| 4 | 11.19 | 17.37 | 11.19 |" in out
     assert "our model, not data of the paper" in out
@@ -250,6 +252,11 @@ def test_self_contact_is_marked() -> None:
     assert touching < 0.7 * free  # yellow, not grey
     without = helices.grid([0.38], [math.radians(5.0)], D, 1.0)
     assert len(without.axes[0].get_legend().get_texts()) == 2
+    for sheet, title in (
+        (figure, "Tubes 3.31 cm thick, 1 m long before they contract, to one scale"),
+        (without, "A tube 3.31 cm thick, 1 m long before it contracts"),
+    ):
+        assert title in [text.get_text() for text in sheet.axes[0].texts]
 
 
 def test_captions_tell_the_shape() -> None:

@@ -37,8 +37,8 @@ def test_json_that_is_no_table_of_arrays_is_refused(results: dict, tmp_path: Pat
     good = json.loads(sr.save_result(results["equilibrium"], tmp_path / "a.json").read_text(encoding="utf-8"))
     row = good["residual"]
     for change, words in (
-        ([1, 2], "no type, shape and values"),
-        ({"type": "object", "shape": [], "values": [1]}, "no type, shape and values"),
+        ([1, 2], "is no array, which has type"),
+        ({"type": "object", "shape": [], "values": [1]}, "is no array, which has type"),
         (row | {"values": ["1"]}, "entries that are no number"),
         (row | {"values": [True]}, "entries that are no number"),
         (row | {"shape": [-1]}, "which is not its shape"),
@@ -110,6 +110,12 @@ def test_nothing_is_overwritten_silently(results: dict, tmp_path: Path) -> None:
     table = sr.save_csv(results["trajectory"], tmp_path / "a.csv")
     with pytest.raises(sr.OutputExists, match=r"a\.csv exists"):
         sr.save_csv(results["trajectory"], table)
+
+
+def test_a_table_is_not_saved_as_an_archive_of_its_name(results: dict, tmp_path: Path) -> None:
+    with pytest.raises(sr.ParameterError, match="save_csv writes tables"):
+        sr.save_result(results["equilibrium"], tmp_path / "held.CSV")
+    assert not list(tmp_path.iterdir())
 
 
 def test_an_interrupted_write_leaves_the_old_file(tmp_path: Path) -> None:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import argparse
-import difflib
 import re
 import sys
 import textwrap
-from collections.abc import Iterable, Sequence
-from typing import Any
+from collections.abc import Sequence
+from typing import Any, NoReturn
 
 from softrobots.cli import (
     bench,
@@ -29,7 +28,7 @@ from softrobots.cli import (
     view,
 )
 from softrobots.cli.options.command_line import exit_status, take_negative_numbers
-from softrobots.core.errors import ParameterError
+from softrobots.core.errors import ParameterError, nearest
 from softrobots.version import __version__
 
 COMMANDS = (
@@ -41,6 +40,7 @@ COMMANDS = (
 
 _ALIASES = {
     "model": "robot",
+    "path": "output",
     "priors": "prior",
     "validation": "hold_out",
     "springs": "spring",
@@ -118,16 +118,20 @@ class Parser(argparse.ArgumentParser):
         """Parse words; refuse unknown ones with a hint."""
         arguments, rest = super().parse_known_args(args, namespace)
         if rest:
-            hint = _nearest(rest[0].partition("=")[0], self._option_string_actions)
+            hint = nearest(rest[0].partition("=")[0], self._option_string_actions)
             if hasattr(arguments, "parameters") and any("=" in word for word in rest if not word.startswith("-")):
                 hint = "; parameters of the robot follow --set: --set NAME=VALUE"
             self.error(f"unrecognized arguments: {' '.join(rest)}{hint}")
         return arguments, rest
 
+    def error(self, message: str) -> NoReturn:
+        """Say what is wrong in one line, as all other errors; the usage of a command would hide it."""
+        self.exit(2, f"error: {message}; {self.prog} --help explains\n")
+
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             names = [str(name) for name in action.choices]
-            message = f"invalid choice: {value!r}{_nearest(str(value), names)}; choose from {', '.join(names)}"
+            message = f"invalid choice: {value!r}{nearest(str(value), names)}; choose from {', '.join(names)}"
             raise argparse.ArgumentError(action, message)
 
 
@@ -179,11 +183,6 @@ def _naming_option(error: ParameterError, arguments: argparse.Namespace) -> Para
         return error
     value = given[name] if name in _SPELLED else error.value
     return ParameterError(_SPELLED.get(name, f"--{name.replace('_', '-')}"), value, error.requirement)
-
-
-def _nearest(word: str, names: Iterable[str]) -> str:
-    near = difflib.get_close_matches(word, list(names), n=1)
-    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 if __name__ == "__main__":

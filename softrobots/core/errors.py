@@ -11,6 +11,8 @@ from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from typing import Any
 
+_LONGEST = 120  # characters of a value in an error
+
 
 class SoftRobotsError(Exception):
     """Base of every error of this package."""
@@ -59,10 +61,8 @@ class NameNotFound(SoftRobotsError, LookupError):
         self.kind = kind
         self.name = name
         self.available = tuple(available)
-        near = difflib.get_close_matches(str(name), self.available, n=1)
-        hint = f" (did you mean {near[0]!r}?)" if near else ""
         listed = "".join(f"\n  {line}" for line in lines) or f" {', '.join(self.available) or 'none'}"
-        super().__init__(f"no {kind} is called {name!r}{hint}; available:{listed}")
+        super().__init__(f"no {kind} is called {name!r}{nearest(str(name), self.available)}; available:{listed}")
 
 
 class FieldNotFound(NameNotFound, TypeError):
@@ -180,9 +180,15 @@ def _rebuild(kind: type[SoftRobotsError], arguments: tuple[Any, ...], attributes
     return error
 
 
-def _short(value: Any, limit: int = 120) -> str:
+def nearest(word: str, names: Iterable[str]) -> str:
+    """Return the question whether the name nearest to a word was meant, for the end of an error; empty if none is near."""
+    near = difflib.get_close_matches(word, list(names), n=1)
+    return f" (did you mean {near[0]!r}?)" if near else ""
+
+
+def _short(value: Any) -> str:
     try:
         text = repr(value).replace("\n", " ")
     except Exception:  # too deep a nesting, an integer of too many digits, an object of the caller
         text = f"<{type(value).__name__}>"
-    return text if len(text) <= limit else text[: limit - 3] + "..."
+    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."

@@ -62,11 +62,11 @@ def read_json(path: Path, largest: int) -> Any:
         raise FileFormatError(f"cannot read {path}: {error}") from error
 
 
-def json_of_arrays(name: str, arrays: Mapping[str, Any]) -> str:
+def json_of_arrays(arrays: Mapping[str, Any]) -> str:
     """Return named arrays of numbers, booleans or text as JSON: of each its type, its shape and its entries in one row.
 
     Raises:
-        ParameterError: If a number is not finite, or the text is longer than `LARGEST_ARRAYS`; names that parameter.
+        ParameterError: If a number is not finite, or the text is longer than `LARGEST_ARRAYS`.
     """
     rows = {}
     for key, value in arrays.items():
@@ -75,11 +75,10 @@ def json_of_arrays(name: str, arrays: Mapping[str, Any]) -> str:
     try:
         text = json.dumps(rows, allow_nan=False, separators=(",", ":")) + "\n"
     except ValueError as error:
-        raise ParameterError(name, "a number that is not finite", "finite to be JSON; NPZ holds such numbers") from error
+        raise ParameterError("result", "a number that is not finite", "finite to be JSON; NPZ holds such numbers") from error
     if len(text) > LARGEST_ARRAYS:
-        raise ParameterError(
-            name, f"{len(text)} bytes of JSON", f"of at most {LARGEST_ARRAYS} bytes, the most that is read again"
-        )
+        most = f"of at most {LARGEST_ARRAYS} bytes, the most that is read again"
+        raise ParameterError("result", f"{len(text)} bytes of JSON", most)
     return text
 
 
@@ -98,7 +97,7 @@ def arrays_of_json(path: Path) -> dict[str, NDArray[Any]]:
 def _array(name: str, row: Any) -> NDArray[Any]:
     """The array of one row of `json_of_arrays`."""
     if not isinstance(row, dict) or row.keys() != {"type", "shape", "values"} or row["type"] not in _ENTRIES:
-        raise FileFormatError(f"its {name!r} has no type, shape and values")
+        raise FileFormatError(f"its {name!r} is no array, which has type, shape and values")
     shape, values, (dtype, kinds) = row["shape"], row["values"], _ENTRIES[row["type"]]
     if not isinstance(values, list) or any(type(value) not in kinds for value in values):
         raise FileFormatError(f"its {name!r} has entries that are no {row['type']}")

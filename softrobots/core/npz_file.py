@@ -69,11 +69,11 @@ def read_arrays(path: Path, *, only: Sequence[str] | None = None, largest: int |
         raise FileFormatError(str(error)) from error
 
 
-def check_size(name: str, arrays: Mapping[str, Any], largest: int) -> None:
-    """Raise ParameterError for a parameter whose arrays together are larger than a reader takes [bytes]."""
+def check_size(arrays: Mapping[str, Any], largest: int) -> None:
+    """Raise ParameterError for a result whose arrays together are larger than a reader takes [bytes]."""
     size = sum(np.asarray(value).nbytes + _LARGEST_HEADER for value in arrays.values())
     if size > largest:
-        raise ParameterError(name, f"{size} bytes of arrays", f"of at most {largest} bytes, the most that is read again")
+        raise ParameterError("result", f"{size} bytes of arrays", f"of at most {largest} bytes, the most that is read again")
 
 
 def _check_end(file: IO[bytes]) -> None:

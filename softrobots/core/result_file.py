@@ -125,7 +125,7 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
 
     Raises:
         ParameterError: If the result is something else, has more arrays than `load_result` reads or, for JSON, a number that is
-            not finite, or the path is not one.
+            not finite, or the path is not one or that of a CSV table.
         OutputExists: If the file exists and `overwrite` is false.
         OutputError: If the file cannot be written.
     """
@@ -133,12 +133,14 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
     if name is None:
         raise ParameterError("result", result, f"one of {', '.join(map(str, KINDS.values()))}")
     path = as_path("path", path)
+    if path.suffix.lower() == ".csv":
+        raise ParameterError("path", str(path), "a name that ends in .npz or .json; save_csv writes tables")
     target = new_file(path if path.suffix or path.is_dir() else path.with_suffix(".npz"), overwrite=overwrite)
     fields = {"format": np.array(FORMAT), "kind": np.array(name), **KINDS[name].to_arrays(result)}
     arrays = {name: array for name, array in fields.items() if array is not None}
-    check_size("result", arrays, KINDS[name].largest)
+    check_size(arrays, KINDS[name].largest)
     if _is_json(target):
-        return write_text(target, json_of_arrays("result", arrays), overwrite=overwrite)
+        return write_text(target, json_of_arrays(arrays), overwrite=overwrite)
     write_atomically(target, lambda file: np.savez_compressed(file, **arrays), overwrite=overwrite)
     return target
 

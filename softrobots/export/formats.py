@@ -110,6 +110,5 @@ def guess_format(path: str | os.PathLike[str]) -> str:
     names = [name for name, row in FORMATS.items() if row.suffix == suffix]
     if len(names) != 1:
         candidates = ", ".join(names) or ", ".join(f"{name} ({row.suffix})" for name, row in FORMATS.items())
-        given = f"(not given, for {path})"
-        raise ParameterError("format", given, f"given for this file name, by --format or format=: {candidates}")
+        raise ParameterError("path", str(path), f"a name that only one format has; else give --format or format=: {candidates}")
     return names[0]

@@ -95,7 +95,7 @@ def to_sdf(
         friction=friction,
     )
     if model.muscles and actuators == "driven":
-        raise ParameterError("actuators", actuators, '"welded" for a robot with muscles or tendons, which SDF does not have')
+        raise ParameterError("actuators", actuators, '"welded" (--welded) for a robot with muscles or tendons, which SDF lacks')
     tree = robot.tree
     names = [body.name for body in tree.bodies] + [joint.name for joint in tree.joints]
     obstacles = robot.contact.obstacles if robot.contact is not None else ()

@@ -55,7 +55,8 @@ def grid(contractions: Any, angles: Any, diameter: float, length: float, handedn
         raise ParameterError("length", length, f"at most {MOST_DIAMETERS:g} diameters, {MOST_DIAMETERS * size:g} m")
     helix.forward(shares, tilts[:, None], size)  # raises before anything is drawn
     drawn = [[draw(share, tilt, size, span, handedness) for share in shares] for tilt in tilts]
-    return sheet(drawn, shares, tilts, f"Tubes {100 * size:.3g} cm thick, {span:.3g} m long before they contract, to one scale")
+    sizes, one = f"{100 * size:.3g} cm thick, {span:.3g} m long before", len(shares) * len(tilts) == 1
+    return sheet(drawn, shares, tilts, f"A tube {sizes} it contracts" if one else f"Tubes {sizes} they contract, to one scale")
 
 
 def radius_and_pitch(angles: Any, diameter: float) -> Any:
