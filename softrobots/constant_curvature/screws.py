@@ -42,6 +42,12 @@ class Screw:
         self.position: FloatArray = self._length * self._direction
         """Position of the end in the frame of the start, shape (..., 3) [m]."""
 
+    def pose(self) -> FloatArray:
+        """Return rotation and position as a matrix, shape (..., 4, 4)."""
+        pose = np.zeros((*self.position.shape[:-1], 4, 4))
+        pose[..., :3, :3], pose[..., :3, 3], pose[..., 3, 3] = self.rotation, self.position, 1.0
+        return pose
+
     def twists(self) -> FloatArray:
         r"""Return the twist of the end per section coordinate, in the axes of the end, linear part first, shape (..., 6, 4).
 

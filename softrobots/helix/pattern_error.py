@@ -167,10 +167,7 @@ def _pieces(plan: Pattern, share: FloatArray) -> list[tuple[FloatArray, FloatArr
 def _motions(curvature: float, torsion: float, lengths: FloatArray) -> FloatArray:
     """Poses along a path of constant curvature and torsion, shape (m, 4, 4)."""
     zero = np.zeros_like(lengths)
-    screw = Screw(np.stack([zero, curvature * lengths, torsion * lengths, zero], axis=-1), lengths)
-    poses = np.zeros((len(lengths), 4, 4))
-    poses[:, :3, :3], poses[:, :3, 3], poses[:, 3, 3] = screw.rotation, screw.position, 1.0
-    return poses
+    return Screw(np.stack([zero, curvature * lengths, torsion * lengths, zero], axis=-1), lengths).pose()
 
 
 def _outer_in_base(plan: Pattern) -> FloatArray:

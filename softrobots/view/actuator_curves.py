@@ -16,6 +16,7 @@ THREAD = 0.09
 
 _THINNEST, _THICKEST = 0.005, 0.18  # radius of a tendon: at least relative to the length of the body, at most to its radius
 
+_SIDES = 6  # corners of the cross-section of an actuator
 _COARSEST = 0.3  # turn about the backbone from point to point [rad]
 _DASHES = 24  # along the whole robot, gaps between them as long
 _WIDEST = 0.4  # radius of a muscle or chamber, relative to that of the body, which it would hide
@@ -38,9 +39,9 @@ class ActuatorCurve:
     shown: FloatArray
     """The points as they are drawn, shape (n, 3) [m]: actuators through the same holes are shown side by side."""
 
-    def surface(self, sides: int = 6) -> tuple[FloatArray, FloatArray]:
+    def surface(self) -> tuple[FloatArray, FloatArray]:
         """Return corners and triangles of the tube around the curve, as `softrobots.view.body.tube`."""
-        return self._tube(self.shown, self.outwards, sides)
+        return self._tube(self.shown, self.outwards)
 
     def dashes(self) -> list[FloatArray]:
         """Return the ends of straight dashes along the curve, each shape (2, 3) [m]; gaps are as long as dashes."""
@@ -49,21 +50,21 @@ class ActuatorCurve:
         ends = np.column_stack([np.interp(places, along, axis) for axis in self.shown.T])
         return list(ends.reshape(_DASHES, 2, 3))
 
-    def dashed_surface(self, sides: int = 6) -> tuple[FloatArray, FloatArray]:
+    def dashed_surface(self) -> tuple[FloatArray, FloatArray]:
         """Return corners and triangles of the dashes; as many whatever the shape of the robot."""
         nearest = np.rint(np.linspace(0, len(self.outwards) - 1, _DASHES)).astype(int)
-        pieces = [self._tube(ends, self.outwards[[at, at]], sides) for ends, at in zip(self.dashes(), nearest, strict=True)]
+        pieces = [self._tube(ends, self.outwards[[at, at]]) for ends, at in zip(self.dashes(), nearest, strict=True)]
         count = len(pieces[0][0])
         triangles = [faces + number * count for number, (_, faces) in enumerate(pieces)]
         return np.concatenate([corners for corners, _ in pieces]), np.concatenate(triangles)
 
-    def _tube(self, points: FloatArray, across: FloatArray, sides: int) -> tuple[FloatArray, FloatArray]:
+    def _tube(self, points: FloatArray, across: FloatArray) -> tuple[FloatArray, FloatArray]:
         """A tube whose cross-sections stand across the curve rather than across the body."""
         z = np.gradient(points, axis=0)
         z /= np.linalg.norm(z, axis=1)[:, None]
         y = np.cross(z, across)
         y /= np.linalg.norm(y, axis=1)[:, None]
-        return tube(np.stack([np.cross(y, z), y, z], axis=-1), points, self.radius, sides)
+        return tube(np.stack([np.cross(y, z), y, z], axis=-1), points, self.radius, _SIDES)
 
 
 def actuator_curves(sections: BentSections, actuators: tuple[ActuatorTag, ...], points: int = 12) -> tuple[ActuatorCurve, ...]:

@@ -156,13 +156,13 @@ class BentSections:
         pin.forwardKinematics(pin_model, data, model.embed(model.coordinates.at(q_motors, q_springs).joints))
         self._coordinates = structure.section_coordinates(q_motors, q_springs)
         self._lengths = np.array([section.length for section in self._table])
-        ends = Screw(self._coordinates, self._lengths)
+        ends = Screw(self._coordinates, self._lengths).pose()
         starts: list[FloatArray] = []
         for row, section in enumerate(self._table):
             if row == 0 or section.segment != self._table[row - 1].segment:
                 starts.append(_start(model, data, row))
             else:
-                starts.append(starts[-1] @ _pose(ends.rotation[row - 1], ends.position[row - 1]))
+                starts.append(starts[-1] @ ends[row - 1])
         self._starts = np.array(starts)
 
     def rows(self, segment: int) -> list[int]:
@@ -184,7 +184,7 @@ class BentSections:
         row = rows[place]
         share = (at - bounds[place]) / self._lengths[row]
         along = Screw(share[:, None] * self._coordinates[row], share * self._lengths[row])
-        return np.asarray(self._starts[row] @ _pose(along.rotation, along.position))
+        return np.asarray(self._starts[row] @ along.pose())
 
     def segments(self, points: int) -> tuple[SegmentBody, ...]:
         """Return the bodies of the segments; see `body_at`.
@@ -210,13 +210,6 @@ class BentSections:
 def outwards(frames: FloatArray, azimuth: FloatArray) -> FloatArray:
     """Return unit vectors at azimuths in the cross-sections of frames, shape (n,) [rad], shape (n, 3)."""
     return np.asarray(np.cos(azimuth)[:, None] * frames[:, :3, 0] + np.sin(azimuth)[:, None] * frames[:, :3, 1])
-
-
-def _pose(rotation: FloatArray, position: FloatArray) -> FloatArray:
-    """Rotations and positions as poses, shape (..., 4, 4)."""
-    pose = np.zeros((*position.shape[:-1], 4, 4))
-    pose[..., :3, :3], pose[..., :3, 3], pose[..., 3, 3] = rotation, position, 1.0
-    return pose
 
 
 def _start(model: SoftModel, data: object, row: int) -> FloatArray:

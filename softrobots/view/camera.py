@@ -28,22 +28,22 @@ def whole_view(points: FloatArray, away: FloatArray) -> tuple[FloatArray, FloatA
         Its place and the point that it looks at, shape (3,) [m].
     """
     middle, distance = 0.5 * (points.min(axis=0) + points.max(axis=0)), float(np.linalg.norm(away))
-    depth, wide, high = _seen(points - middle, away)
+    depth, wide, high = picture_axes(away) @ (points - middle).T
     needed = depth + np.maximum(np.abs(high), np.abs(wide) / WIDTH) / (_FIELD * _FILLED)
     return middle + max(distance, float(needed.max())) / distance * away, middle
 
 
 def narrowest(points: FloatArray, eye: FloatArray, middle: FloatArray) -> float:
     """Return the least width over height of a picture of a camera of `whole_view` that has all points in it."""
-    depth, wide, _ = _seen(points - eye, eye - middle)
+    depth, wide, _ = picture_axes(eye - middle) @ (points - eye).T
     return float(np.max(np.abs(wide) / np.maximum(-depth, 1e-9)) / (_FIELD * _FILLED))
 
 
-def _seen(points: FloatArray, away: FloatArray) -> FloatArray:
-    """Depth towards a camera in a direction, and places across and up its picture, shape (3, n) [m]."""
+def picture_axes(away: FloatArray) -> FloatArray:
+    """Return unit vectors towards a camera in a direction, shape (3,), not vertical, and across and up its picture, in rows."""
     back = away / np.linalg.norm(away)
     aside = np.cross((0.0, 0.0, 1.0), back) / np.linalg.norm(back[:2])
-    return np.asarray(np.stack([back, aside, np.cross(back, aside)]) @ points.T)
+    return np.stack([back, aside, np.cross(back, aside)])
 
 
 def box_corners(low: FloatArray, high: FloatArray) -> FloatArray:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -95,24 +95,14 @@ class IdentificationPage(Viewer):
         points: dict[str, list[FloatArray]] = {name: [] for name in _COLOURS}
         for key in _places(shown):
             counted = np.isfinite(shown.residuals[key])
-            there = np.asarray(counted[:, :3].all(axis=1))
-            turned = counted.shape[1] == 6
+            there, turned = np.asarray(counted[:, :3].all(axis=1)), counted.shape[1] == 6
             for name, values in (("measured", shown.measurements.measured[key]), ("predicted", shown.predicted[key])):
                 poses = to_base @ _poses(values)
                 points[name].append(poses[there, :3, 3])
-                node, paint = root[f"{key}/{name}"], geometry.MeshLambertMaterial(color=_COLOURS[name])
-                node["ball"].set_object(geometry.Sphere(_POINT * size), paint)
+                node = root[f"{key}/{name}"]
+                _put_point(node, geometry.MeshLambertMaterial(color=_COLOURS[name]), size, turned)
                 seen = {node: there} | ({node["axes"]: np.asarray(counted.all(axis=1))} if turned else {})
-                for axis in range(3 * turned):
-                    sides, place = np.full(3, 0.5 * _POINT * size), np.eye(4)
-                    sides[axis], place[axis, 3] = _AXIS * size, 0.5 * _AXIS * size
-                    node[f"axes/{axis}"].set_object(geometry.Box(sides.tolist()), paint)
-                    node[f"axes/{axis}"].set_transform(place)
-                for number, row in enumerate(rows.tolist()):
-                    for frame in (number * FRAME_RATE, (number + 1) * FRAME_RATE - 1):
-                        animation.at_frame(node, frame).set_transform(poses[row])
-                        for one, visible in seen.items():
-                            animation.at_frame(one, frame).set_property("visible", "boolean", bool(visible[row]))
+                _animate(animation, node, poses[rows], {one: visible[rows] for one, visible in seen.items()})
         clouds = {name: np.concatenate(some) for name, some in points.items()}
         for name, cloud in clouds.items():
             colours = np.tile(np.array(rgb(_COLOURS[name]))[:, None] / 255.0, (1, len(cloud)))
@@ -122,6 +112,27 @@ class IdentificationPage(Viewer):
         lines = geometry.LineSegments(geometry.PointsGeometry(ends.T.astype(np.float32)), geometry.LineBasicMaterial(_LINE))
         root["all/errors"].set_object(lines)
         return clouds["predicted"]
+
+
+def _put_point(node: Any, paint: Any, size: float, turned: bool) -> None:
+    """Draw a point of a robot of a size [m], with axes if it has a rotation."""
+    import meshcat.geometry as geometry
+
+    node["ball"].set_object(geometry.Sphere(_POINT * size), paint)
+    for axis in range(3 * turned):
+        sides, place = np.full(3, 0.5 * _POINT * size), np.eye(4)
+        sides[axis], place[axis, 3] = _AXIS * size, 0.5 * _AXIS * size
+        node[f"axes/{axis}"].set_object(geometry.Box(sides.tolist()), paint)
+        node[f"axes/{axis}"].set_transform(place)
+
+
+def _animate(animation: Any, node: Any, poses: FloatArray, seen: Mapping[Any, NDArray[np.bool_]]) -> None:
+    """Place a node at each pose for the frames of that row, shape (n, 4, 4), and show nodes where they are seen, shape (n,)."""
+    for number, pose in enumerate(poses):
+        for frame in (number * FRAME_RATE, (number + 1) * FRAME_RATE - 1):
+            animation.at_frame(node, frame).set_transform(pose)
+            for one, visible in seen.items():
+                animation.at_frame(one, frame).set_property("visible", "boolean", bool(visible[number]))
 
 
 def _camera(points: FloatArray) -> tuple[FloatArray, FloatArray]:

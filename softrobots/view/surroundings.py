@@ -26,8 +26,6 @@ _ROUND = (16, 32)  # rings and corners of the ends of a capsule
 class DrawnObstacle(NamedTuple):
     """An obstacle, or a capsule of the robot."""
 
-    name: str
-    """Name of the obstacle in the environment, or of the link."""
     geometry: Any
     """A `coal` shape, or the `softrobots.view.mesh_triangles.Triangles` of others."""
     pose: FloatArray
@@ -52,7 +50,7 @@ def drawn_obstacles(
     """
     if environment is None:
         return ()
-    return tuple(DrawnObstacle(str(one.name), *_solid(one, centre, size, ground)) for one in environment)
+    return tuple(DrawnObstacle(*_solid(one, centre, size, ground)) for one in environment)
 
 
 def drawn_contacts(equilibrium: Equilibrium) -> dict[str, Contact]:
@@ -75,7 +73,7 @@ def drawn_capsules(model: SoftModel, q: FloatArray) -> tuple[DrawnObstacle, ...]
     for tag in capsule_tags(model):
         shape = capsule_shape(tag)
         placement = data.oMf[model.frame_id(tag.link)] * pin.SE3(shape.placement.rotation, shape.placement.position)
-        drawn.append(DrawnObstacle(tag.link, _capsule(*shape.size), placement.homogeneous))
+        drawn.append(DrawnObstacle(_capsule(*shape.size), placement.homogeneous))
     return tuple(drawn)
 
 

@@ -14,7 +14,7 @@ from softrobots.core.checks import FloatArray, instance_of
 from softrobots.identification.identification import UNITS, Comparison, Identification
 from softrobots.identification.uncertainty import CONFIDENCE, Uncertainty
 from softrobots.view.figures import canvas
-from softrobots.view.figures.canvas import COLOURS, MARKERS, grid_and_legend, new_figure, new_panels, new_plot, plain_words
+from softrobots.view.figures.canvas import COLOURS, grid_and_legend, line_style, new_figure, new_panels, new_plot, plain_words
 
 _MOST_PANELS = 12  # panels of predicted against measured
 _MOST_PAIRS = 6  # confidence ellipses
@@ -67,8 +67,7 @@ def residuals(result: Identification) -> Any:
         scale, unit = _SMALL.get(part.unit, (1.0, part.unit))
         left = scale * result.residuals[key][:, part.columns]
         for number, name in enumerate(part.axes):
-            hollow = {"mfc": "white" if number >= len(COLOURS) else None}
-            axes.plot(left[:, number], ls="", ms=4.5, label=name, marker=_marker(number), color=_colour(number), **hollow)
+            axes.plot(left[:, number], label=name, **line_style(number) | {"ls": "", "ms": 4.5})
         for rank, row in enumerate(result.outliers):
             place = row, max(np.nan_to_num(left[row]), key=abs)
             axes.plot(*place, ls="", marker="o", ms=13, mfc="none", color="0.1")
@@ -113,8 +112,8 @@ def predicted(result: Identification) -> Any:
         every = np.concatenate(shown, axis=None)
         axes.plot(*[[np.nanmin(every), np.nanmax(every)]] * 2, color="0.3", lw=0.8)
         for aside, numbers in enumerate(shown):
-            style = {"color": _colour(aside), "marker": _marker(aside), "ms": 4.5 + aside, "mfc": "white" if aside else None}
-            axes.plot(*numbers, ls="", label="kept aside" if aside else "fitted", **style)
+            style = line_style(aside) | {"ls": "", "ms": 4.5 + aside, "mfc": "white" if aside else None}
+            axes.plot(*numbers, label="kept aside" if aside else "fitted", **style)
         title = plain_words(f"{part.title} {part.axes[number]}")
         axes.set(title=title, xlabel=f"measured [{part.unit}]", ylabel=f"predicted [{part.unit}]")
         axes.title.set_fontsize(10)
@@ -283,11 +282,3 @@ def _ellipse(result: Identification, uncertainty: Uncertainty, pair: tuple[int, 
     middle = result.solution[list(pair)][:, None]
     logarithmic = np.array([[result.parameters[one].logarithmic] for one in pair])
     return np.where(logarithmic, middle * np.exp(np.where(logarithmic, around, 0.0)), middle + around)
-
-
-def _colour(number: int) -> str:
-    return COLOURS[number % len(COLOURS)]
-
-
-def _marker(number: int) -> str:
-    return MARKERS[number % len(MARKERS)]

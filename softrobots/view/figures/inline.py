@@ -11,6 +11,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
 from softrobots.robots.fields import XacroRobot
 from softrobots.view.appearance import LINE_COLOUR, TUBE_COLOUR, rgb, shared_scale
+from softrobots.view.camera import picture_axes
 from softrobots.view.figures.canvas import CONTACT, FORCE, GREY, INK
 from softrobots.view.figures.pose import DrawnPose, Posed, model_of, with_robot_loaded
 from softrobots.view.tension_scale import round_down, tension_colour
@@ -42,9 +43,8 @@ class _Paper(NamedTuple):
     @classmethod
     def around(cls, points: FloatArray, eye: FloatArray) -> _Paper:
         """Fit points, shape (n, 3) [m], seen from a direction, shape (3,)."""
-        back = eye / np.linalg.norm(eye)
-        aside = np.cross((0.0, 0.0, 1.0), back) / np.linalg.norm(back[:2])
-        view = np.column_stack([aside, np.cross(aside, back), back])
+        back, aside, up = picture_axes(eye)
+        view = np.column_stack([aside, -up, back])
         low, high = (points @ view)[:, :2].min(axis=0), (points @ view)[:, :2].max(axis=0)
         room = np.array([_WIDE - 2.0 * _EDGE, _HIGH - 3.0 * _EDGE])
         scale = float(np.min(room / np.maximum(high - low, 1e-3)))
