@@ -87,7 +87,7 @@ def run(arguments: argparse.Namespace) -> None:
     shapes.write_csv(folder / "shapes.csv")
     write_text(folder / "contraction_limits.csv", csv_text(LIMIT_COLUMNS, limits), overwrite=False)
     write_text(folder / "grasp_forces.csv", csv_text(FORCE_COLUMNS, forces), overwrite=False)
-    print(f"\nShapes\n\n{shapes.to_markdown()}")
+    print(f"\nShapes\n\n{table(SHAPE_COLUMNS, map(cells_of, shapes.rows))}")
     print("Smallest contraction without self-contact, of tubes of any diameter\n")
     print(
         table(("angle [deg]", "exact", "2 pi b >= D"), ((f"{np.degrees(a):.4g}", f"{e:.4f}", f"{s:.4f}") for a, e, s in limits))
@@ -107,6 +107,9 @@ def shape_table(contractions: Sequence[float], angles: Any, diameter: float) -> 
     return helix.shape_table(contractions, np.asarray(angles)[:, None], diameter)
 
 
+SHAPE_COLUMNS = (
+    "angle [deg]", "contraction", "D [m]", "Ro [m]", "Ri [m]", "b [m/rad]", "turn distance [m]", "realisable", "2 pi b >= D",
+)  # fmt: skip
 LIMIT_COLUMNS = ("angle [rad]", "contraction_limit [-]", "simple_contraction_limit [-]")
 FORCE_COLUMNS = ("pressure [Pa]", "deflection [m]", "unwrapping [N]", "contact [N]", "force [N]")
 
@@ -122,6 +125,14 @@ def force_table(test: helix.GraspTest, pressure: float) -> list[tuple[float, ...
     forces = test.force((np.arange(6) / 5.0 * pressure)[:, None])
     columns = (forces.pressure, forces.deflection, forces.unwrapping, forces.contact, forces.force)
     return list(zip(*(column.ravel().tolist() for column in columns), strict=True))
+
+
+def cells_of(row: atlas.ShapeRow) -> list[str]:
+    """Return the cells of a helix for `SHAPE_COLUMNS`, rounded."""
+    lengths = [f"{length:.5f}" for length in (row.diameter, row.outer_radius, row.inner_radius, row.pitch)]
+    distance = "none" if row.turn_distance is None else f"{row.turn_distance:.5f}"
+    answers = ["yes" if answer else "no" for answer in (row.realisable, row.realisable_by_simple_rule)]
+    return [f"{np.degrees(row.angle):.4g}", f"{row.contraction:.4g}", *lengths, distance, *answers]
 
 
 def table(names: Sequence[str], rows: Iterable[Sequence[str]]) -> str:

@@ -545,14 +545,6 @@ def test_nothing_is_overwritten_unasked(tmp_path: Path) -> None:
         helix.paper_grid().write_csv(3)  # type: ignore[arg-type]
 
 
-def test_markdown_has_a_line_for_each_helix() -> None:
-    lines = helix.paper_grid().to_markdown().splitlines()
-    assert len(lines) == 19
-    assert {line.count("|") for line in lines} == {10}
-    assert lines[2] == "| 2.5 | 0.5 | 0.03310 | 0.06546 | 0.03236 | 0.00568 | 0.03547 | yes | yes |"
-    assert "| none |" in lines[-4]
-
-
 def test_the_words_on_a_tube_hold_its_numbers() -> None:
     """Turns that overlap; a centre line that folds; both; neither; and a tube without neighbouring turns."""
     flat = helix.self_contact(helix.HelixShape(0.1, 0.06, 0.004))  # radius 0.08, diameter 0.04, rise of a turn 0.0251

@@ -66,7 +66,7 @@ def test_segments_are_as_stiff_as_the_bench_says(
     for name, whole in (("bending", bending), ("torsional", torsion), ("axial", axial)):
         found = np.ravel(getattr(arm, f"{name}_stiffness")) / lengths
         assert np.allclose(found, whole, rtol=1e-15, atol=0.0)
-    assert arm.n_muscles == 3 * arm.n_segments == 3 * len(lengths)
+    assert arm.n_actuators == 3 * arm.n_segments == 3 * len(lengths)
     assert arm.n_joints == 6 * count * len(lengths)
     lumped = sr.PccArm(segment_lengths=lengths, hinges=count, chain="lumped", torsion=twists, extension=not twists)
     assert lumped.n_joints == 3 * count * len(lengths)

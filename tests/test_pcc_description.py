@@ -422,7 +422,7 @@ def test_any_valid_arm_obeys_the_rules_of_portable_urdf(
     movable = check_portable(urdf)
     model = sr.load_model(robot)
     assert set(list(model.pinocchio.names)[1:]) == movable
-    assert model.n_motors == robot.n_muscles
+    assert model.n_motors == robot.n_actuators
     other = tool("yourdfpy").URDF.load(io.StringIO(urdf), load_meshes=False, build_collision_scene_graph=False)
     assert other.validate()
     assert set(other.actuated_joint_names) == movable
@@ -469,8 +469,8 @@ def test_one_number_stands_for_every_segment() -> None:
     assert robot.offset == (0.0, math.pi / 3, math.pi / 3)
     assert PccArm(segment_lengths=(0.5,), offset=1.0).offset == (0.0,)
     assert PccArm(segment_lengths=(0.5,), offset=(1.0,)).offset == (1.0,)
-    assert (robot.n_segments, robot.n_muscles) == (3, 9)
-    assert PccArm(muscle_azimuths=np.array([])).n_muscles == 0
+    assert (robot.n_segments, robot.n_actuators) == (3, 9)
+    assert PccArm(muscle_azimuths=np.array([])).n_actuators == 0
 
 
 @pytest.mark.parametrize("form", [{"elastic_sections": 2}, {"chain": "lumped", "hinges": 3}])

@@ -90,7 +90,7 @@ class Oracle:
                 row = np.zeros((arm.n_segments, self.n, 4))
                 row[segment] = (distance * np.sin(azimuth), -distance * np.cos(azimuth), 0.0, 1.0)
                 rows.append(row.ravel())
-        self.muscles = np.array(rows).reshape(arm.n_muscles, -1)
+        self.muscles = np.array(rows).reshape(arm.n_actuators, -1)
 
     def lengths(self, z: np.ndarray) -> np.ndarray:
         """Helices around the backbone; those of hinges to second order in the twist, without the strains beside it."""

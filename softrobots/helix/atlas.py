@@ -68,17 +68,6 @@ class ShapeTable:
         """Return one dictionary per helix, from column to value, in SI units."""
         return [{name: getattr(row, name) for name in _COLUMNS} for row in self.rows]
 
-    def to_markdown(self) -> str:
-        """Return the table in Markdown, rounded, angles in degrees."""
-        names = "angle [deg] | contraction | D [m] | Ro [m] | Ri [m] | b [m/rad] | turn distance [m] | realisable | 2 pi b >= D"
-        lines = [f"| {names} |", "|" + "---|" * len(_COLUMNS)]
-        for row in self.rows:
-            distance = "none" if row.turn_distance is None else f"{row.turn_distance:.5f}"
-            lengths = f"{row.diameter:.5f} | {row.outer_radius:.5f} | {row.inner_radius:.5f} | {row.pitch:.5f} | {distance}"
-            answers = " | ".join("yes" if answer else "no" for answer in (row.realisable, row.realisable_by_simple_rule))
-            lines.append(f"| {np.degrees(row.angle):.4g} | {row.contraction:.4g} | {lengths} | {answers} |")
-        return "\n".join(lines) + "\n"
-
     def write_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write the table as CSV in full precision: the fields of `ShapeRow` with units, `true` or `false`, empty for None.
 

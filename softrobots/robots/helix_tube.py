@@ -14,6 +14,7 @@ import numpy as np
 from softrobots import helix
 from softrobots.core.checks import FloatArray, instance_of, positive_number
 from softrobots.core.errors import ParameterError, StraightTube
+from softrobots.helix.shapes import turning_sign
 from softrobots.robots.continuum_arm import CHAINS, HINGE_RULES, MOST_SECTIONS
 from softrobots.robots.fields import XacroRobot, check_parameters, parameter
 from softrobots.robots.helix_sections import actuator_strains, fewest_sections
@@ -287,7 +288,7 @@ class HelixTube(XacroRobot):
 
     def _chain_along_actuator(self, contraction: float) -> tuple[FloatArray, float]:
         """Strains and rest length of the chain of a real actuator at a contraction."""
-        sign = 1.0 if self.handedness == "right" else -1.0
+        sign = turning_sign(self.handedness)
         return actuator_strains(contraction, self.angle, self.diameter, sign), self.length / math.cos(self.angle)
 
     def _check_sections(self, fewest: int) -> None:

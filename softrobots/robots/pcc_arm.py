@@ -132,8 +132,3 @@ class PccArm(ContinuumArm):
             positive_array(name, measured, unit)
             stiffness[field] = tuple(k * length for k, length in zip(measured, lengths, strict=True))
         return cls(**(stiffness | fields))
-
-    @property
-    def n_muscles(self) -> int:
-        """Number of muscles of the whole arm."""
-        return self.n_actuators

@@ -132,8 +132,3 @@ class TendonArm(ContinuumArm):
             return self._each(name)
         rods = zip(*(self._each(fact) for fact in ("young_modulus", "poisson_ratio", "backbone_radius")), strict=True)
         return tuple(of_rod(*rod) for rod in rods)
-
-    @property
-    def n_tendons(self) -> int:
-        """Number of tendons of the whole arm."""
-        return self.n_actuators

@@ -59,11 +59,6 @@ def _whole_plan(contraction: Any, angle: Any, diameter: Any, length: Any, **opti
     return plan, plan.locate([0.0, plan.line_length])
 
 
-def _whole_table(contraction: Any, angle: Any, diameter: Any) -> Any:
-    table = helix.shape_table(contraction, angle, diameter)
-    return table, table.to_markdown()
-
-
 def _whole_design(**arguments: Any) -> Any:
     design = helix.HelixDesign(**arguments)
     return design, design.summary()
@@ -153,7 +148,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "check_self_contact": (helix.check_self_contact, {"shape": SHAPE, "turns": 3.0, "on_contact": "error"}),
     "contraction_limit": (helix.contraction_limit, {"angle": 0.0873, "diameter": 1.0}),
     "simple_contraction_limit": (helix.simple_contraction_limit, {"angle": 0.0873}),
-    "shape_table": (_whole_table, ACTUATOR),
+    "shape_table": (helix.shape_table, ACTUATOR),
     "grasp_force": (
         helix.grasp_force,
         {
