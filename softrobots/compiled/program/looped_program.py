@@ -221,6 +221,8 @@ def _sequence(
         end = base + 1
         sequence.insert(segment.last + 1 - leading, (end, 0, 0, 0, 0))
         if unknowns.routed:
+            what, held = "lengths", unknowns.held_lengths
+            added, size = held_blocks(plan, number, segment) if held else ([], 0)
             blocks += [start_lengths(plan, number, segment), leave_segment(plan, number)]
             blocks += [] if infix else [keep_lengths(plan, number, segment)]
             outward_calls.append((end, f"keep_lengths_{number}(w)"))
@@ -228,22 +230,16 @@ def _sequence(
             if plan.routes.guided and not infix:
                 inward_calls.append((end, f"rub(w, {number})"))
             step_calls.append((end, f"leave_segment_{infix}{number}(w)"))
-            if unknowns.held_lengths:
-                ends_of_segment, size = held_blocks(plan, number, segment)
-                blocks += ends_of_segment
-                sequence.insert(segment.first - leading, (base, record, 0, 0, 0))
-                record += size
-                inward_calls.append((base, f"eliminate_lengths_{infix}{number}(w, {at})"))
-                step_calls.append((base, f"solve_lengths_{infix}{number}(w, {at})"))
-            continue
-        ends_of_segment, size = segment_blocks(plan, number, segment)
-        blocks += ends_of_segment
-        inward_calls.append((end, f"add_multipliers_{infix}{number}(w)"))
-        if segment.groups:
+        else:
+            what, held = "multipliers", bool(segment.groups)
+            added, size = segment_blocks(plan, number, segment)
+            inward_calls.append((end, f"add_multipliers_{infix}{number}(w)"))
+        blocks += added
+        if held:
             sequence.insert(segment.first - leading, (base, record, 0, 0, 0))
             record += size
-            inward_calls.append((base, f"eliminate_multipliers_{infix}{number}(w, {at})"))
-            step_calls.append((base, f"solve_multipliers_{infix}{number}(w, {at})"))
+            inward_calls.append((base, f"eliminate_{what}_{infix}{number}(w, {at})"))
+            step_calls.append((base, f"solve_{what}_{infix}{number}(w, {at})"))
     return blocks, sequence, record
 
 

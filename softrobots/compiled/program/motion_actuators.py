@@ -55,11 +55,13 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
     """Trace the functions of the actuators of a looped chain."""
     unknowns, own, held = routes.unknowns, routes.routes, routes.held
     forms = route_forms(routes)
+    numbers = {form: number for number, form in enumerate(forms.values())}
     strain, rate, *_ = plan.strains
+    calls: dict[str, list[tuple[int, str]]] = {"follow": [], "swerve": []} if held else {"follow": [], "pull": []}
     blocks: list[Block] = []
     before: list[tuple[str, str]] = []
     tables: dict[str, object] = {}
-    for name, form in forms.items():
+    for number, (name, form) in enumerate(forms.items()):
         added, columns = length_blocks(routes, name, form, routes.swerving if held else None)
         blocks += [*added, *form_blocks(routes, name, form)]
         texts = [LENGTHS, SWERVE] if columns else [PULLS, _NO_SWERVE]
@@ -67,9 +69,6 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
         before += [(text, name) for text in (*texts, arms_text(name))]
         if columns:
             tables |= own.tables() | {f"POINT_TABLE_{name}": tuple(columns.numbers)}
-    named = {form: (number, name) for number, (name, form) in enumerate(forms.items())}
-    calls: dict[str, list[tuple[int, str]]] = {"follow": [], "swerve": []} if held else {"follow": [], "pull": []}
-    for number, name in named.values():
         element = "(w, ROUTE_ELEMENT[i]"
         calls["follow"] += [
             (number, f"follow_routes_{name}{element}, ROUTE_PLACE[i] + {strain})"),
@@ -86,8 +85,8 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
         for row in range(segment.first, segment.last + 1):
             if row in own.beside:
                 row_of[row] = first
-                steps.append((named[form_of(routes, row)][0], row, unknowns.place[unknowns.moving(row)[0]]))
-        end = len(named) + number
+                steps.append((numbers[form_of(routes, row)], row, unknowns.place[unknowns.moving(row)[0]]))
+        end = len(forms) + number
         steps.append((end, 0, 0))
         first += len(segment.stretched)
         blocks.append(keep_lengths(routes, number, segment))

@@ -43,22 +43,22 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
     loads = springs + len(chain.elastic)
     placements = loads + len(chain.rest)
     records, kinds, coordinates, frames = [], [], [], []
+    shares = [(k + 1) / points for k in range(points)]
     axes = np.eye(3)  # of the chain's frame in Pinocchio's of the same joint
     for element in chain.elements:
         start, shift = axes @ element.rotation, axes @ element.translation
         axes = np.eye(3)
         if isinstance(element, ChainJoint):
             axes = element.axes
+            behind = axes.T.ravel().tolist()
             kinds.append(_KINDS.index("slide" if element.slides else "turn"))
             coordinates.append(strains + strains_of(element)[0] if element.motor is None else element.motor)
             frames.append({"name": element.name, "kind": "joint", "share": 1})
         else:
+            behind = [element.length, *[0.0] * 8]
             kinds.append(_KINDS.index("section"))
             coordinates.append(strains + element.strain)
-            shares = [(k + 1) / points for k in range(points)]
             frames += [{"name": element.name, "kind": "section", "share": share} for share in shares]
-        length = [0.0] * 9 if isinstance(element, ChainJoint) else [element.length, *[0.0] * 8]
-        behind = axes.T.ravel().tolist() if isinstance(element, ChainJoint) else length
         records += [*start.ravel().tolist(), *shift.tolist(), *behind]
     kinds.append(_KINDS.index("slide"))  # the tip, which does not move
     coordinates.append(placements + 12 * (len(frames) + 2))  # a zero
@@ -84,7 +84,7 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
         "PLACED_KIND": tuple(kinds),
         "PLACED_COORDINATE": tuple(coordinates),
         "PLACED_RECORD": tuple(map(float, records)),
-        "SHARES": tuple((k + 1) / points for k in range(points)),
+        "SHARES": tuple(shares),
     }
     lines = [f"{name} = {value if value != () else (0,)!r}" for name, value in values.items()]
     blocks = [*(_place(kind).text() for kind in _KINDS), _slack_walls(unknowns, strains, loads).text()]
