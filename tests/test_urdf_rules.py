@@ -226,5 +226,3 @@ def test_robots_paths_and_text_are_checked_alike(tmp_path: Path) -> None:
     assert found[0] == found[1] == found[2] == found[3]
     with pytest.raises(sr.ParameterError, match="a robot, a path, or URDF text"):
         check_description(3)
-    with pytest.raises(sr.ParameterError, match="count"):
-        check_description(robot, count=0)

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import softrobots
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.tools.checks import row_problems
-from softrobots.cli.tools.kinematics import KinematicsRow, compare_kinematics
+from softrobots.cli.tools.kinematics import COUNT, KinematicsRow, compare_kinematics
 from softrobots.cli.tools.known_tools import installed_tools
 from softrobots.cli.tools.packages import EXTRAS, missing_of_extras, required_packages
 from softrobots.compiled.run.backends import available_backend, cache_folder, cache_is_kept
@@ -184,5 +184,5 @@ def _kinematics(folder: Path, tools: Sequence[str], report: _Report) -> None:
     for row in rows:
         measured = (f"{row.position_error:.1e} m", f"{row.rotation_error:.1e} rad", f"{row.links} links, {row.joints} joints")
         cells.append((row.file, row.tool, row.version, *measured, *row_problems(row)))
-    report.add("Largest difference from Pinocchio's kinematics at 20 random configurations", cells)
+    report.add(f"Largest difference from Pinocchio's kinematics at {COUNT} random configurations", cells)
     report.wrong.extend(f"{row.file}: {text}" for row in rows for text in row_problems(row))

@@ -42,7 +42,7 @@ class Tape:
     def functions(self) -> dict[str, Callable[..., Any]]:
         """Return the functions on numbers that expressions call, by name, as ones that write on the tape."""
         functions = {name: self._traced(own) for name, own in vars(math).items() if callable(own)}
-        of_all = {"min": _least, "max": _greatest, "fsum": _total}
+        of_all = {"min": _of_all(min), "max": _of_all(max), "fsum": _of_all(math.fsum)}
         return functions | {name: self._traced(own, of_all=True) for name, own in of_all.items()} | {"float": self._float}
 
     def literal(self, text: Any) -> TracedNumber | None:
@@ -167,13 +167,5 @@ class TracedNumber:
     __trunc__, __floor__, __ceil__ = _operation(math.trunc), _operation(math.floor), _operation(math.ceil)
 
 
-def _least(*items: Any, **named: Any) -> Any:
-    return min(items, **named)
-
-
-def _greatest(*items: Any, **named: Any) -> Any:
-    return max(items, **named)
-
-
-def _total(*items: float) -> float:
-    return math.fsum(items)
+def _of_all(function: Callable[..., Any]) -> Callable[..., Any]:
+    return lambda *items, **named: function(items, **named)

@@ -76,14 +76,13 @@ def check_structure(root: ElementTree.Element, source: str) -> None:
     known: dict[int, set[str]] = {0: set(), 1: set(), 3: set()}
     for link in links:
         where = f"link {link.get('name')} of {source}"
-        for element in link:
-            if element.tag == "inertial":
-                _check_numbers(where, element, _OF_LINKS, known)
-                for mass in element.findall("mass"):
-                    if number_in(mass.get("value")) < 0.0:
-                        raise DescriptionError(f"{where} has the mass {mass.get('value')}; it is negative")
-            elif element.tag in ("visual", "collision"):
-                _check_numbers(where, element.iter(), _OF_SHAPES, known)
+        for inertial in link.findall("inertial"):
+            _check_numbers(where, inertial, _OF_LINKS, known)
+        for mass in link.findall("inertial/mass"):
+            if number_in(mass.get("value")) < 0.0:
+                raise DescriptionError(f"{where} has the mass {mass.get('value')}; it is negative")
+        for shape in (*link.findall("visual"), *link.findall("collision")):
+            _check_numbers(where, shape.iter(), _OF_SHAPES, known)
     for joint in joints:
         where = f"joint {joint.get('name')} of {source}"
         _check_numbers(where, joint, _OF_JOINTS, known)

@@ -70,21 +70,13 @@ def prediction_table(found: Identification) -> tuple[list[str], Iterator[list[An
 
     def rows() -> Iterator[list[Any]]:
         for name, one in parts:
-            numbers = [_flat(values) for key in one.residuals for values in _numbers(one, key)]
-            for row, cells in enumerate(np.hstack(numbers).tolist()):
+            parts_of = ((one.measurements.measured[key], one.predicted[key], left) for key, left in one.residuals.items())
+            flat = [values[:, :3, 3] if values.ndim == 3 else values for three in parts_of for values in three]
+            for row, cells in enumerate(np.hstack(flat).tolist()):
                 label = one.measurements.labels[row] if one.measurements.labels is not None else ""
                 yield [name, one.measurements.where(row), label, *("" if cell != cell else cell for cell in cells)]
 
     return names, rows()
-
-
-def _numbers(one: Comparison, key: str) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Measured and predicted numbers, and what remains."""
-    return one.measurements.measured[key], one.predicted[key], one.residuals[key]
-
-
-def _flat(values: FloatArray) -> FloatArray:
-    return values[:, :3, 3] if values.ndim == 3 else values
 
 
 def _axes(key: str, values: FloatArray) -> list[str]:

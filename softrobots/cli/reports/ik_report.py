@@ -35,14 +35,8 @@ def trajectory_answer(trajectory: Trajectory) -> dict[str, Any]:
         Fact("wrinkled", [equilibrium.wrinkled for equilibrium in equilibria]),
         Fact("stable", [equilibrium.stable for equilibrium in equilibria]),
         Fact("within_limits", [equilibrium.within_limits for equilibrium in equilibria]),
-        *_contact_forces(trajectory),
+        *([Fact("contact_forces", forces, "N")] if (forces := trajectory.contact_forces) else []),
         Fact("residual", [equilibrium.residual for equilibrium in equilibria], "N m"),
         Fact("method", trajectory.method),
     ]
     return model_answer(model, equilibria[0].load, facts)
-
-
-def _contact_forces(trajectory: Trajectory) -> list[Fact]:
-    """The normal force on each obstacle over the path; nothing in free space."""
-    forces = trajectory.contact_forces
-    return [Fact("contact_forces", forces, "N")] if forces else []

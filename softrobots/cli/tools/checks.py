@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from softrobots.cli.tools.kinematics import KinematicsRow, as_file, compare_kinematics
-from softrobots.core.checks import positive_integer
+from softrobots.cli.tools.kinematics import COUNT, KinematicsRow, as_file, compare_kinematics
 from softrobots.core.errors import SoftRobotsError
 from softrobots.description.sources import read_source
 from softrobots.description.tag_reader import read_tags
@@ -16,21 +15,18 @@ from softrobots.model.loader import load_model
 from softrobots.robots import Robot
 
 
-def check_description(source: Robot | Path | str, *, count: int = 20) -> tuple[Finding, ...]:
+def check_description(source: Robot | Path | str) -> tuple[Finding, ...]:
     """Check a robot description: what is in it, every rule of portable URDF, and how tools read it.
 
     Args:
         source: What `read_source` takes.
-        count: Number of random configurations at which yourdfpy is compared with Pinocchio.
 
     Returns:
         What was checked and what is wrong with it, up to a defect that makes further checks impossible.
 
     Raises:
-        ParameterError: If `count` is not positive.
         SoftRobotsError: Whatever `read_source` raises.
     """
-    positive_integer("count", count)
     urdf, label = read_source(source)
     rules = check_rules(urdf, label)
     findings = []
@@ -42,16 +38,16 @@ def check_description(source: Robot | Path | str, *, count: int = 20) -> tuple[F
     tags, *loaded = findings
     if not loaded[0].ok:
         return (tags, *rules, *loaded)
-    return (tags, *rules, *loaded, _valid_in_yourdfpy(source), _kinematics(source, count))
+    return (tags, *rules, *loaded, _valid_in_yourdfpy(source), _kinematics(source))
 
 
-def _kinematics(source: Robot | Path | str, count: int) -> Finding:
+def _kinematics(source: Robot | Path | str) -> Finding:
     """Compare yourdfpy's kinematics of every link with Pinocchio's."""
     try:
-        (row,) = compare_kinematics(source, ["yourdfpy"], count=count)
+        (row,) = compare_kinematics(source, ["yourdfpy"])
     except SoftRobotsError as error:
         return Finding("yourdfpy's kinematics", (str(error),))
-    return Finding("yourdfpy's kinematics", tuple(row_problems(row)), (f"{_row_text(row)} at {count} random configurations",))
+    return Finding("yourdfpy's kinematics", tuple(row_problems(row)), (f"{_row_text(row)} at {COUNT} random configurations",))
 
 
 def _row_text(row: KinematicsRow) -> str:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import tempfile
-import time
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -22,6 +21,9 @@ from softrobots.core.xml_input import parse_xml, read_xml
 from softrobots.description.sources import read_source
 from softrobots.model.pinocchio_data import MAX_DOF
 from softrobots.robots import Robot
+
+COUNT = 20
+"""Random configurations of a comparison."""
 
 _WIDEST = (2.0 * np.pi, 1.0)
 """Joints with wider limits are drawn within plus and minus these [rad, m]."""
@@ -51,10 +53,6 @@ class KinematicsRow:
     """Largest angle between a link and itself in Pinocchio [rad]; 0 if the tool refuses the file."""
     precision: float
     """Largest error that the tool is allowed [m and rad]."""
-    load_time: float
-    """Time to load the file [s]."""
-    pose_time: float
-    """Time to place all links once [s]."""
     limits: str
     """What the tool cannot do with a URDF file."""
     problem: str = ""
@@ -68,7 +66,7 @@ class KinematicsRow:
 
 
 def compare_kinematics(
-    source: Robot | Path | str, tools: Sequence[str] | None = None, *, count: int = 20, seed: int = 20210312
+    source: Robot | Path | str, tools: Sequence[str] | None = None, *, count: int = COUNT, seed: int = 20210312
 ) -> tuple[KinematicsRow, ...]:
     """Compare where tools place the links of a URDF with where Pinocchio places them.
 
@@ -118,18 +116,15 @@ def _compare(tool: Tool, file: Path, label: str, expected: _Expected) -> Kinemat
         "precision": tool.precision,
         "limits": tool.limits,
     }
-    start = time.perf_counter()
     try:
         with open_in(tool, file) as robot:
-            loaded = time.perf_counter()
             placed = [robot.poses(values) for values in expected.values]
-            finished = time.perf_counter()
     except SoftRobotsError:
         raise
     except Exception as error:  # a tool may raise anything if it refuses a file
         facts |= {"joints": 0, "links": 0, "lost_links": tuple(expected.poses[0]), "position_error": 0.0, "rotation_error": 0.0}
         problem = f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else 'no reason given'}"
-        return KinematicsRow(**facts, load_time=time.perf_counter() - start, pose_time=0.0, problem=problem)
+        return KinematicsRow(**facts, problem=problem)
     kept = [link for link in expected.poses[0] if link in placed[0]]
     pairs = [(here[link], there[link]) for here, there in zip(placed, expected.poses, strict=True) for link in kept]
     errors = np.array([pose_error(one, other) for one, other in pairs]).reshape(-1, 2)
@@ -142,8 +137,6 @@ def _compare(tool: Tool, file: Path, label: str, expected: _Expected) -> Kinemat
         lost_links=tuple(link for link in expected.poses[0] if link not in kept),
         position_error=position,
         rotation_error=rotation,
-        load_time=loaded - start,
-        pose_time=(finished - loaded) / len(expected.values),
         problem="a pose that is not finite" if broken else "",
     )
 

@@ -13,6 +13,7 @@ import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from typing import NoReturn
 
 from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import number_in, parse_xml, read_xml
@@ -132,7 +133,7 @@ class _Survey:
         if not self._pixels <= MOST_PIXELS:
             self._refuse(f"pictures, textures and heights of more than {MOST_PIXELS:g} pixels in all")
 
-    def _refuse(self, what: str) -> None:
+    def _refuse(self, what: str) -> NoReturn:
         raise DescriptionError(f"{self._source} exceeds what is read: {what}")
 
     def _model(self, element: ElementTree.Element, chain: tuple[Path, ...]) -> int:
@@ -148,12 +149,11 @@ class _Survey:
         name = element.get("file", "")
         if self._folder is None:
             self._refuse(f"the file {name[:200]!r} included by text, which has no folder; a path of a file is required")
-        folder = self._folder or Path()
         try:
-            file = (folder / name).resolve()
+            file = (self._folder / name).resolve()
         except (OSError, RuntimeError, ValueError):  # a loop of links, an invalid name
             file = Path("/")
-        if folder not in file.parents:
+        if self._folder not in file.parents:
             self._refuse(f"the included file {name[:200]!r}, which is not below the folder of the description")
         return file
 

@@ -35,7 +35,8 @@ def give_mass(body: Body, point: FloatArray, count: int) -> tuple[Body, float]:
     """
     if body.mass <= 0.0 or count == 0:
         return body, 0.0
-    moments = _second_moment(body.inertia_in_body)
+    inertia = body.inertia_in_body
+    moments = 0.5 * np.trace(inertia) * np.eye(3) - inertia
     away = point - body.centre.position
     if np.linalg.eigvalsh(moments)[0] <= 0.0:
         return body, 0.0
@@ -61,7 +62,3 @@ def small_ball(name: str, mass: float, point: FloatArray, radius: float) -> Body
 def gyration(body: Body) -> float:
     """Return the mean radius of gyration of a body [m]; 0 without mass."""
     return float(np.sqrt(np.trace(body.inertia) / (3.0 * body.mass))) if body.mass > 0.0 else 0.0
-
-
-def _second_moment(inertia: FloatArray) -> FloatArray:
-    return np.asarray(0.5 * np.trace(inertia) * np.eye(3) - inertia)
