@@ -7,7 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
-from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
+from softrobots.cli.options.output_files import add_output, add_plot, check_files, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.errors import NoCriticalLoad
@@ -49,8 +49,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> bool:
     """Follow the branches and print the answer; tell whether there are any."""
-    check_output(arguments)
-    check_plot(arguments)
+    check_files(arguments)
     model = statics_model_of(arguments)
     motors = motors_of(model, arguments.motors)
     options = {"frame": arguments.frame, "gravity": gravity_of(arguments), "largest_step": arguments.largest_step}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.cli.options.command_line import add_numbers
-from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
+from softrobots.cli.options.output_files import add_output, add_plot, check_files, save, write_plot
 from softrobots.cli.reports.answers import Fact, add_json, answer_of, print_answer
 from softrobots.core.summary import facts
 from softrobots.inflated_beam import BendingTest, fit_characterisation, moment_limits, read_characterisation
@@ -52,8 +52,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Read, fit and print the answer."""
-    check_output(arguments, ".npz")
-    check_plot(arguments)
+    check_files(arguments, ".npz")
     tube = {"pressure": arguments.pressure, "radius": arguments.radius}
     rig = BendingTest(probe_distance=arguments.probe_distance, hinge_offset=arguments.hinge_offset, offset=arguments.offset)
     data = read_characterisation(arguments.data, rig)

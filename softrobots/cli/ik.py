@@ -16,8 +16,7 @@ from softrobots.cli.options.output_files import (
     ROS_FORMS,
     add_output,
     add_plot,
-    check_output,
-    check_plot,
+    check_files,
     save,
     write_plot,
 )
@@ -96,8 +95,7 @@ def add_parser(subparsers: Any) -> None:
 def run(arguments: argparse.Namespace) -> None:
     """Solve and print the answer."""
     _refuse_contradictions(arguments)
-    check_output(arguments, *RESULT_FILES, *ROS_FILES)
-    check_plot(arguments)
+    check_files(arguments, *RESULT_FILES, *ROS_FILES)
     path = None if arguments.waypoints is None else read_waypoints(arguments.waypoints)
     model = statics_model_of(arguments)
     options = {

@@ -7,7 +7,7 @@ from typing import Any
 
 from softrobots.cli.options.command_line import add_gravity, add_numbers, gravity_of
 from softrobots.cli.options.load_argument import add_environment, environment_of
-from softrobots.cli.options.output_files import add_output, check_output, save
+from softrobots.cli.options.output_files import add_output, check_files, save
 from softrobots.cli.options.robot_argument import (
     add_model,
     add_motors,
@@ -75,7 +75,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Estimate and print the answer."""
-    check_output(arguments)
+    check_files(arguments)
     model, frame = statics_model_of(arguments), arguments.frame
     check_feels(model)
     if arguments.point is not None:

@@ -12,8 +12,7 @@ from softrobots.cli.options.output_files import (
     add_output,
     add_plot,
     check_ending,
-    check_output,
-    check_plot,
+    check_files,
     save,
     write_plot,
 )
@@ -65,8 +64,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Find the modes and print the answer."""
-    check_output(arguments)
-    check_plot(arguments)
+    check_files(arguments)
     positive_integer("--count", arguments.count)
     model = statics_model_of(arguments)
     pages = _pages(arguments, model.n_springs)

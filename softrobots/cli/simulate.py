@@ -19,7 +19,7 @@ from softrobots.cli.options.output_files import (
     add_output,
     add_plot,
     check_ending,
-    check_output,
+    check_files,
     check_plot,
     save,
     write_plot,
@@ -153,7 +153,7 @@ def run(arguments: argparse.Namespace) -> None:
 
 def _check_files(arguments: argparse.Namespace) -> None:
     """Refuse files that cannot be written, and options without effect, before the work."""
-    check_output(arguments, *RESULT_FILES, *ROS_FILES)
+    check_files(arguments, *RESULT_FILES, *ROS_FILES)
     for option in _PICTURES:
         check_plot(arguments, option)
     if arguments.page is not None:

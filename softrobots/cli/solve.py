@@ -7,7 +7,7 @@ from typing import Any
 
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
-from softrobots.cli.options.output_files import add_output, add_plot, check_output, check_plot, save, write_plot
+from softrobots.cli.options.output_files import add_output, add_plot, check_files, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.reports.equilibrium_report import equilibrium_answer
@@ -70,8 +70,7 @@ def add_parser(subparsers: Any) -> None:
 
 def run(arguments: argparse.Namespace) -> None:
     """Solve and print the answer."""
-    check_output(arguments)
-    check_plot(arguments)
+    check_files(arguments)
     model = statics_model_of(arguments)
     motors = motors_of(model, arguments.motors)
     start = None if arguments.start is None else finite_array("--start", arguments.start, (model.n_springs,), "rad or m")

@@ -36,20 +36,23 @@ def add_output(
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"save {what} {forms} (not saved)")
 
 
-def check_output(arguments: argparse.Namespace, *endings: str) -> None:
-    """Refuse a file of `-o` that cannot be written.
+def check_files(arguments: argparse.Namespace, *endings: str) -> None:
+    """Refuse a file of `-o`, or of `--plot` if the command has it, that cannot be written.
 
     Raises:
-        ParameterError: If its name has none of the endings, by default those of `RESULT_FILES`.
+        ParameterError: If the name of the first has none of the endings, by default those of `RESULT_FILES`.
         OutputExists: If it exists and `--overwrite` is not given, or it is a folder.
         OutputError: If its folder cannot be created.
         MissingDependency: If it is a log, and what writes it is not installed.
+        SoftRobotsError: What `check_plot` raises.
     """
     if arguments.output is not None:
         check_ending("-o", arguments.output, *(endings or RESULT_FILES))
         if arguments.output.suffix.lower() == ".mcap":
             require_mcap()
         new_file(arguments.output, overwrite=arguments.overwrite)
+    if "plot" in arguments:
+        check_plot(arguments)
 
 
 def save(arguments: argparse.Namespace, result: Any) -> list[Path]:
