@@ -28,7 +28,7 @@ from softrobots.cli import (
     view,
 )
 from softrobots.cli.options.command_line import exit_status, take_negative_numbers
-from softrobots.core.errors import ParameterError, nearest
+from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.version import __version__
 
 COMMANDS = (
@@ -118,7 +118,7 @@ class Parser(argparse.ArgumentParser):
         """Parse words; refuse unknown ones with a hint."""
         arguments, rest = super().parse_known_args(args, namespace)
         if rest:
-            hint = nearest(rest[0].partition("=")[0], self._option_string_actions)
+            hint = NameNotFound("option", rest[0].partition("=")[0], self._option_string_actions).hint
             if hasattr(arguments, "parameters") and any("=" in word for word in rest if not word.startswith("-")):
                 hint = "; parameters of the robot follow --set: --set NAME=VALUE"
             self.error(f"unrecognized arguments: {' '.join(rest)}{hint}")
@@ -131,7 +131,8 @@ class Parser(argparse.ArgumentParser):
     def _check_value(self, action: argparse.Action, value: Any) -> None:
         if action.choices is not None and value not in action.choices:
             names = [str(name) for name in action.choices]
-            message = f"invalid choice: {value!r}{nearest(str(value), names)}; choose from {', '.join(names)}"
+            hint = NameNotFound("choice", value, names).hint
+            message = f"invalid choice: {value!r}{hint}; choose from {', '.join(names)}"
             raise argparse.ArgumentError(action, message)
 
 

@@ -54,6 +54,7 @@ class NameNotFound(SoftRobotsError, LookupError):
         kind: What the name stands for, e.g. "frame".
         name: The unknown name.
         available: The names that exist.
+        hint: The question whether the nearest of them was meant, for the message; empty if none is near.
     """
 
     def __init__(self, kind: str, name: str, available: Iterable[str], *, lines: Iterable[str] = ()) -> None:
@@ -61,8 +62,10 @@ class NameNotFound(SoftRobotsError, LookupError):
         self.kind = kind
         self.name = name
         self.available = tuple(available)
+        near = difflib.get_close_matches(str(name), self.available, n=1)
+        self.hint = f" (did you mean {near[0]!r}?)" if near else ""
         listed = "".join(f"\n  {line}" for line in lines) or f" {', '.join(self.available) or 'none'}"
-        super().__init__(f"no {kind} is called {name!r}{nearest(str(name), self.available)}; available:{listed}")
+        super().__init__(f"no {kind} is called {name!r}{self.hint}; available:{listed}")
 
 
 class FieldNotFound(NameNotFound, TypeError):
@@ -178,12 +181,6 @@ def _rebuild(kind: type[SoftRobotsError], arguments: tuple[Any, ...], attributes
     error.args = arguments
     error.__dict__.update(attributes)
     return error
-
-
-def nearest(word: str, names: Iterable[str]) -> str:
-    """Return the question whether the name nearest to a word was meant, for the end of an error; empty if none is near."""
-    near = difflib.get_close_matches(word, list(names), n=1)
-    return f" (did you mean {near[0]!r}?)" if near else ""
 
 
 def _short(value: Any) -> str:

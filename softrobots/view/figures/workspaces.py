@@ -10,7 +10,7 @@ from softrobots.core.checks import FloatArray, finite_number, instance_of
 from softrobots.core.errors import ParameterError
 from softrobots.statics.workspace import Workspace
 from softrobots.statics.workspace_map import WorkspaceMap
-from softrobots.view.figures.canvas import SMALL, WIDTH, new_figure, plain_words
+from softrobots.view.figures.canvas import SMALL, WIDTH, new_figure, plain_words, require_matplotlib
 
 NOT_REACHED, LOST, WRINKLED, CARRIED = range(4)
 """Outcome of a target under a load: never reached, lost under the load, reached with a wrinkled link, carried."""
@@ -76,7 +76,7 @@ def workspace_maps(result: WorkspaceMap, *, load: Any = None) -> Any:
         raise ParameterError("result", result.grid.shape, "a map with at least two coordinates x and z (this is its shape)")
     wanted = result.loads[-1] / 2.0 if load is None else finite_number("load", load, "N")
     level = int(np.abs(result.loads - wanted).argmin())
-    new_figure((1.0, 1.0))  # raises MissingDependency before matplotlib is imported here
+    require_matplotlib()
     from matplotlib.colors import BoundaryNorm, ListedColormap
     from matplotlib.patches import Patch
 
