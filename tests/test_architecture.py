@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import re
 import shutil
-from collections.abc import Callable
+from functools import cache
 from pathlib import Path
 from types import ModuleType
 
@@ -16,10 +16,12 @@ from tests.conftest import CHECKOUT, load_script
 PAGE = CHECKOUT / "docs" / "architecture.md"
 
 
-@pytest.fixture
-def script(tool: Callable[[str], ModuleType]) -> ModuleType:
-    tool("matplotlib")
-    return load_script("draw_architecture")
+@pytest.fixture(scope="module")
+def script() -> ModuleType:
+    """The script, which reads each package once."""
+    script = load_script("draw_architecture")
+    script.read_rooms = cache(script.read_rooms)
+    return script
 
 
 def test_the_picture_is_current(script: ModuleType, capsys: pytest.CaptureFixture) -> None:

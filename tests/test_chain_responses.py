@@ -16,10 +16,10 @@ from tests.support.routed_robots import ROBOTS as ROUTED
 from tests.support.serial_chains import ROBOTS
 
 ALONE = ("given lengths", "tensions", "tendons", "winding lengths", "helix")
-QUICK = ("given lengths", "tendons")
 
 
-@pytest.mark.parametrize("kind", [one if one in QUICK else pytest.param(one, marks=pytest.mark.study) for one in ALONE])
+@pytest.mark.study
+@pytest.mark.parametrize("kind", ALONE)
 def test_compiled_derivatives_are_those_of_pinocchio(kind: str) -> None:
     """Of robots with parameters, in both modes; of rows that share a force, and of one that failed."""
     case = CASES[kind]()
@@ -47,7 +47,8 @@ CHAINS: dict[str, Any] = {"stacked": ROBOTS["stacked"], "on_an_arm": ROUTED["on_
 CHAINS |= {name: ROUTED[name] for name in ("lumped_winding", "lumped_coils")}
 
 
-@pytest.mark.parametrize("name", [one if "lumped" in one else pytest.param(one, marks=pytest.mark.study) for one in CHAINS])
+@pytest.mark.study
+@pytest.mark.parametrize("name", CHAINS)
 def test_compiled_rates_are_differences(name: str) -> None:
     """Along a change of motor joints, actuators and force at once; reverse mode is the transpose."""
     model = CHAINS[name]()

@@ -265,7 +265,7 @@ def test_points_beside_the_knee_do_not_narrow_the_interval() -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(250, 4000)
+@pytest.mark.shortened(100, 4000)
 @pytest.mark.parametrize(("noise", "proportional"), [(0.03, True), (0.05, True), (0.08, True), (0.2, False), (0.6, False)])
 @each_row("free", [True, False])
 @each_row("n", [6, 15, 40, 100])

@@ -149,6 +149,7 @@ def test_doctor_tells_of_a_cache_that_does_not_last(told, monkeypatch: pytest.Mo
     assert "for this process alone: the folder for caches cannot be written" in out
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("one_robot")
 def test_doctor_sees_files_that_differ_and_kinematics_that_do_not_agree(
     told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path

@@ -307,6 +307,7 @@ def test_pictures_of_what_is_no_arm_are_refused(call, message: str) -> None:
         call(sr.constant_curvature.Arc((0.5, 0.5), (1.0, 0.5), 0.0))
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "words", [["pcc", "inverse", "--arc", "0.5", "1", "0"], ["helix", "forward", "--length", "0.3"], ["helix", "limit"]]
 )

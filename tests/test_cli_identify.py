@@ -107,6 +107,7 @@ def test_a_folder_holds_the_fit_and_a_robot_for_other_commands(folder: Path, tol
     assert json.loads(out)["parameters"]["base.position.x"]["value"] == pytest.approx(0.1, abs=1e-7), err
 
 
+@pytest.mark.study
 @pytest.mark.filterwarnings("default::UserWarning")
 def test_without_matplotlib_all_but_the_pictures_is_written(folder: Path, told: Told, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "matplotlib.figure", None)
@@ -147,6 +148,7 @@ def test_a_prior_may_be_around_the_value_that_the_robot_has(folder: Path, told: 
         assert found["link[2].stiffness"]["prior"] == pytest.approx([160.0, 8.0 if "%" in short else 2.5], rel=1e-12)
 
 
+@pytest.mark.study
 def test_errors_are_told_also_without_their_mean(folder: Path, told: Told) -> None:
     """Of a base that is 0.1 m away and not fitted, the mean of the differences takes all but the bend of another stiffness."""
     _, out, _ = told(*WORDS, "--fit", "hinge_offset", "--hold-out", "day3", "-o", "fit", "--json")

@@ -652,6 +652,7 @@ def test_ik_follows_waypoints(told: Told, answer, arm: sr.SoftModel, path: Path,
         assert re.search(rf"^{line}$", out, re.M), line
 
 
+@pytest.mark.study
 def test_ik_follows_as_the_paper_does_and_says_where_a_link_wrinkles(answer, told: Told, arm: sr.SoftModel, path: Path) -> None:
     words = ("ik", "inflatable_arm", "--waypoints", str(path), *FORCE)
     found = answer(*words, "--method", "paper", "--gain", "20")

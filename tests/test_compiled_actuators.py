@@ -113,7 +113,14 @@ def test_balance_of_curves_in_a_rod(rng: np.random.Generator) -> None:
 
 
 @pytest.mark.parametrize(
-    "name", ["tendons", "winding", "lumped", "winding_lengths", "on_an_arm", "lumped_winding", "lumped_coils"]
+    "name",
+    [
+        *("tendons", "lumped_coils"),
+        *(
+            pytest.param(name, marks=pytest.mark.study)
+            for name in ("winding", "winding_lengths", "on_an_arm", "lumped_winding")
+        ),
+    ],
 )
 def test_what_actuators_do_and_feel(name: str, rng: np.random.Generator) -> None:
     """The Jacobian and loads are those of Pinocchio's path; loads change by a force as differences say."""

@@ -154,6 +154,7 @@ def rod(count: int, chain: str, locked: tuple[str, ...] = (), stiff: float = 1.0
     return sr.compile(sr.load_model(arm, muscles="forces"), backend="python", locked_strains=locked)
 
 
+@pytest.mark.study
 def test_convergence_to_a_rod_in_space() -> None:
     """Bent, twisted and stretched by its weight and a force aside: Kirchhoff's equations as a boundary-value problem."""
     force, weight = np.array([0.9, 0.7, -0.4]), np.array([0.6 * 1.2, 0.0, 0.6 * -2.0])  # 0.6 kg/m

@@ -147,6 +147,7 @@ def test_a_step_solves_the_equations_of_motion(name: str, order: int, rng: np.ra
         assert np.abs(error).max() < 1e-12 * size
 
 
+@pytest.mark.study
 def test_locked_strains_of_given_lengths_stay_at_rest(rng: np.random.Generator) -> None:
     """Without twist: the motion is that of an arm ten million times as stiff in twist, and lengths are linear."""
     arm = {"segment_lengths": (0.5, 0.4), "elastic_sections": 2}

@@ -198,19 +198,6 @@ def test_the_c_file_takes_the_same_steps(kind: str, tmp_path: Path) -> None:
         np.testing.assert_allclose(controller.get("POSITION", model.n_springs), expected.q_springs[row + 1], rtol=0, atol=1e-11)
 
 
-@pytest.mark.system
-def test_numba_takes_the_same_steps() -> None:
-    """Single and in lanes."""
-    model, force = LONG["rod"](), (0.2, -0.1, 0.05)
-    given = {"gravity": GRAVITY, "damping_time": 0.01, "time_step": 1e-3, "output_step": 1e-3}
-    expected = sr.compile(model, backend="python").simulate(0.02, (), force=force, **given)
-    fast = sr.compile(model, backend="numba")
-    found = fast.simulate(0.02, (), force=force, **given)
-    np.testing.assert_allclose(found.tip_position, expected.tip_position, rtol=0, atol=1e-11)
-    many = fast.simulations(0.02, np.zeros((2, 0)), forces=force, **given)
-    np.testing.assert_allclose(many.tip_position[1], expected.tip_position, rtol=0, atol=1e-11)
-
-
 def test_a_section_does_not_leave_its_range() -> None:
     """A section bent by 160 degrees and turning further: simulate on Pinocchio and the compiled model stop at half a turn."""
     model = rod(elastic_sections=2)

@@ -119,12 +119,17 @@ def test_committed_urdf_is_what_xacro_generates(name: str) -> None:
         (sr.InflatableArm, {}),
         (sr.InflatableArm, ODD),
         (sr.InflatableArm, ODD_WALLS),
-        (PccArm, ODD_PCC),
         (PccArm, ODD_LUMPED),
-        (PccArm, ODD_MUSCLES),
-        (TendonArm, ODD_TENDONS),
-        (HelixTube, ODD_TUBE),
-        (HelixTube, LUMPED_TUBE),
+        *(
+            pytest.param(*case, marks=pytest.mark.study)
+            for case in (
+                (PccArm, ODD_PCC),
+                (PccArm, ODD_MUSCLES),
+                (TendonArm, ODD_TENDONS),
+                (HelixTube, ODD_TUBE),
+                (HelixTube, LUMPED_TUBE),
+            )
+        ),
         *(pytest.param(kind, {}, marks=pytest.mark.study) for kind in (PccArm, TendonArm, HelixTube)),
     ],
 )

@@ -116,6 +116,7 @@ def arm(kind: str, **fields: Any) -> sr.SoftModel:
     )
 
 
+@pytest.mark.study
 def test_slow_motion_is_a_path_of_equilibria() -> None:
     """A tendon is pulled and let go within 2.4 s, where vibrations last 0.1 s: `solve_equilibrium` from state to state."""
     model = arm("tension", guide_friction=0.4, bending_friction=1e-3)
@@ -194,6 +195,7 @@ def test_a_motion_goes_on_from_another_and_from_a_file(tmp_path: Path) -> None:
     assert np.abs(forgot.q_springs[-1] - whole.q_springs[-1]).max() > 1e-6
 
 
+@pytest.mark.study
 def test_steps_are_chosen_for_a_tolerance() -> None:
     """The tip at the end is within it of that of a run with steps of a four hundredth of a swing."""
     band = 0.02

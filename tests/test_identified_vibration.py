@@ -42,6 +42,7 @@ def arm() -> tuple[ParameterSet, np.ndarray, sr.Measurements]:
     return chosen, true, measured(chosen, true, commanded, forces, 3, {0, 2, 4})
 
 
+@pytest.mark.study
 def test_an_arm_gives_its_own_mass_stiffness_and_damping_back(tmp_path: Path) -> None:
     chosen, true, data = arm()
     found = sr.identify(ARM, data, ("link[*].stiffness", "density", "damping_time", "motor[2].offset", "base.rotation.x"))

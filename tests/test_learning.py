@@ -217,7 +217,7 @@ def test_what_has_no_compiled_derivatives_is_refused_by_name() -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(500, 100_000)
+@pytest.mark.shortened(250, 100_000)
 def test_derivatives_of_random_cases(cases: int) -> None:
     """All inputs change at once, in a random direction: rates are differences of batches, and both modes are transposes.
 
@@ -242,7 +242,7 @@ def test_derivatives_of_random_cases(cases: int) -> None:
 
 @pytest.mark.study
 @pytest.mark.timeout(1800)
-@pytest.mark.shortened(100, 25_000)
+@pytest.mark.shortened(50, 25_000)
 @pytest.mark.parametrize("kind", [name for name in ROBOTS if name != "wrist"])
 def test_derivatives_of_random_load_estimates(kind: str, cases: int) -> None:
     """The same of load estimates, from the torques of random forces; of robots with three motors, which feel every force.

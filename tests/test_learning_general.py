@@ -10,10 +10,9 @@ from softrobots.learning.differentiable import Differentiable
 from softrobots.learning.general_solver import GeneralSolver
 from tests.support.learning_cases import CASES, LENGTHS, OPTIONS, PCC, STEP, changes, solved
 
-LONG = ("tensions", "winding lengths")
 
-
-@pytest.mark.parametrize("kind", [pytest.param(one, marks=pytest.mark.study) if one in LONG else one for one in CASES])
+@pytest.mark.study
+@pytest.mark.parametrize("kind", CASES)
 def test_derivatives_are_differences_of_solved_robots(kind: str) -> None:
     """Along a change of motors, force and parameters at once; reverse mode is the transpose."""
     case = CASES[kind]()

@@ -23,7 +23,7 @@ def true_case(
 
 
 @pytest.mark.study
-@pytest.mark.shortened(500, 10_000)
+@pytest.mark.shortened(250, 10_000)
 def test_true_force_comes_back_in_99_of_100_random_cases(arm: sr.SoftModel, cases: int) -> None:
     """1e-6 relative in at least 99 % of 10 000 cases at 18 N; each miss is a pose near a singular one."""
     rng, found = np.random.default_rng(0), 0
@@ -342,10 +342,10 @@ def test_the_force_is_within_its_errors(arm: sr.SoftModel) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(500, 6000)
+@pytest.mark.shortened(250, 6000)
 @pytest.mark.parametrize("kind", ["arm", "two hinges", "three links"])
 def test_the_force_is_within_its_errors_in_95_of_100_cases(kind: str, cases: int) -> None:
-    """6000 repetitions, standard error 0.28 %: 94 to 96 %; 3.5 times that of the 500 of the gate."""
+    """6000 repetitions, standard error 0.28 %: 94 to 96 %; 3.5 times that of the 250 of the gate."""
     assert coverage(measured_robot(kind), cases, 1) == pytest.approx(0.95, abs=0.01 * np.sqrt(6000 / cases))
 
 
@@ -490,7 +490,7 @@ def estimated(robot: sr.SoftModel, motors: np.ndarray, torques: np.ndarray, rest
 
 
 @pytest.mark.study
-@pytest.mark.shortened(200, 400)
+@pytest.mark.shortened(100, 400)
 @pytest.mark.parametrize("n_links", [3, 4, 5])
 def test_arms_of_many_links_are_estimated_as_by_brute_force(n_links: int, cases: int) -> None:
     """Random cases at 10 to 100 N: the true force comes back in 99 %, more often than without starting again.

@@ -172,6 +172,7 @@ def kirchhoff(laminate: composite_strip.Laminate, turn: float, weight: float) ->
     return shot(end)[:, 0]
 
 
+@pytest.mark.study
 def test_a_strip_of_laminate_is_a_rod_of_three_stiffnesses() -> None:
     """Every strip under its heaviest weight, to 1 mm (22 hinges are coarse in torsion); and the paper's own curve."""
     record, points = recorded("composite_strip"), composite_strip.measurements()

@@ -144,7 +144,7 @@ def test_the_tip_stays_within_the_tolerance_over_a_run_with_a_jump_of_the_load(f
         assert np.abs(moved.energy.balance).max() < 1e-2 * np.abs(moved.energy.load_work).max()
 
 
-@pytest.mark.parametrize(("duration", "begin", "end"), [(2.0, 0.5, 0.7), (1.0, 0.1, 0.3)])
+@pytest.mark.parametrize(("duration", "begin", "end"), [pytest.param(2.0, 0.5, 0.7, marks=pytest.mark.study), (1.0, 0.1, 0.3)])
 def test_a_pulse_between_round_times_moves_a_robot_as_dop853_says(duration: float, begin: float, end: float) -> None:
     """A jump is found by bisection, and the sample at which the load begins to change: the same time but for a rounding."""
     model, fast = pendulum(2, 4.0), sr.compile(pendulum(2, 4.0), backend="python")
@@ -335,6 +335,7 @@ def test_a_chaotic_motion_ends_in_an_error_that_says_how_far_it_is_known(monkeyp
     assert best.tip_error == caught.value.residual > best.tolerance
 
 
+@pytest.mark.study
 def test_a_section_that_leaves_its_range_ends_in_an_error_with_what_was_reached() -> None:
     with pytest.raises(
         sr.NotConverged, match=r"no step from t = .* succeeds.*: section_1_1.* at the end of the range"

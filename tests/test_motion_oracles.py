@@ -107,7 +107,8 @@ def test_sections_move_as_a_cosserat_rod_to_second_order() -> None:
     assert np.ptp(path, axis=0).max() > 0.1
 
 
-@pytest.mark.parametrize("twists", [pytest.param(False, marks=pytest.mark.study), True])
+@pytest.mark.study
+@pytest.mark.parametrize("twists", [False, True])
 def test_free_vibration_is_that_of_mujoco(twists: bool, tool: Callable[[str], ModuleType]) -> None:
     """Runge and Kutta's method of MuJoCo, refined until nothing changes: our error is of second order in time."""
     mujoco = tool("mujoco")
@@ -137,6 +138,7 @@ def test_free_vibration_is_that_of_mujoco(twists: bool, tool: Callable[[str], Mo
     assert errors[2] < 2e-4  # the tip moves by 0.5 m
 
 
+@pytest.mark.study
 def test_flexures_reach_as_far_as_the_rod() -> None:
     """The elastica in closed form, of a tip that turns by 45 and 64 degrees: flexures are of fourth order, hinges of second.
 
@@ -174,24 +176,26 @@ def test_flexures_carry_no_actuators() -> None:
 @pytest.mark.study
 @pytest.mark.timeout(600)
 @pytest.mark.parametrize(
-    ("rod", "form", "force", "bends", "steps"),
-    [(TPU, "lumped", 0.1, 10, 500), (TPU, "flexures", 0.3, 11, 600), (STEEL, "flexures", 0.6, 12, 1300)],
+    ("rod", "form", "force", "bends", "steps", "duration"),
+    [(TPU, "lumped", 0.1, 10, 500, 10.0), (TPU, "flexures", 0.3, 11, 600, 4.0), (STEEL, "flexures", 0.6, 12, 1300, 4.0)],
     ids=["pairs", "flexures", "steel"],
 )
 def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
-    rod: PlanarRod, form: str, force: float, bends: int, steps: int
+    rod: PlanarRod, form: str, force: float, bends: int, steps: int, duration: float
 ) -> None:
     """30 pairs of hinges or flexures, undamped, released upright from a sideways force, with steps by default.
 
-    The reference is five times as good, by one with a polynomial and a fifth of the steps in 0.05 s less.
+    Periods that differ drift apart in proportion to time: four seconds have two fifths of the error of ten. The reference is
+    five times as good, by one with a polynomial and a fifth of the steps in 0.05 s less.
     """
-    fine = _path(dataclasses.replace(rod, bends=bends), force, 10.0, 200, steps)
-    coarse = _path(dataclasses.replace(rod, bends=bends - 1), force, 10.0, 200, 4 * steps // 5)
-    assert np.linalg.norm(fine - coarse, axis=1).mean() < 1e-4
+    rows, allowed = round(20.0 * duration), 5e-4 * duration / 10.0
+    fine = _path(dataclasses.replace(rod, bends=bends), force, duration, rows, steps)
+    coarse = _path(dataclasses.replace(rod, bends=bends - 1), force, duration, rows, 4 * steps // 5)
+    assert np.linalg.norm(fine - coarse, axis=1).mean() < 0.2 * allowed
     model = chain(rod, 30, form, extension=rod.stretches > 0)
     start = sr.solve_equilibrium(model, (), force=(force, 0.0, 0.0), gravity=(0.0, 0.0, -9.81))
-    moved = sr.compile(model).simulate(10.0, (), start=start, gravity=(0.0, 0.0, -9.81), damping_time=0.0, output_step=0.05)
-    assert np.linalg.norm(moved.tip_position[:, [0, 2]] - fine, axis=1).mean() < 5e-4
+    moved = sr.compile(model).simulate(duration, (), start=start, gravity=(0.0, 0.0, -9.81), damping_time=0.0, output_step=0.05)
+    assert np.linalg.norm(moved.tip_position[:, [0, 2]] - fine, axis=1).mean() < allowed
 
 
 @pytest.mark.study
@@ -199,8 +203,8 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
 @pytest.mark.parametrize(
     "engine",
     [
-        pytest.param("general", marks=pytest.mark.shortened(5, 50)),
-        pytest.param("compiled", marks=pytest.mark.shortened(40, 1600)),
+        pytest.param("general", marks=pytest.mark.shortened(3, 50)),
+        pytest.param("compiled", marks=pytest.mark.shortened(20, 1600)),
     ],
 )
 def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:

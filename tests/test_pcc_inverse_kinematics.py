@@ -98,6 +98,7 @@ def test_tensions_bring_the_tip_there_too(rng: np.random.Generator) -> None:
         assert np.linalg.norm(found.q_motors) <= np.linalg.norm(tensions) * (1 + 1e-6)  # from zero: no more than what there is
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("azimuths", [(0.0, np.pi / 2, np.pi, -np.pi / 2), (0.2, 1.3, 2.9, 4.4)])
 def test_four_muscles_stay_consistent(azimuths: tuple) -> None:
     arm = model(muscle_azimuths=azimuths, elastic_sections=2)
@@ -320,9 +321,8 @@ def test_an_unreachable_target_comes_with_the_nearest_point(target: tuple, rng: 
     assert best.error <= nearest(np.array(target), rng) + 1e-6
 
 
-@pytest.mark.parametrize(
-    "target", [(0.05, 0.02, 0.3), *(pytest.param(at, marks=pytest.mark.study) for at in ((-0.4, 0.1, 0.2), (0.0, 0.1, 0.15)))]
-)
+@pytest.mark.study
+@pytest.mark.parametrize("target", [(0.05, 0.02, 0.3), (0.0, 0.1, 0.15)])
 def test_the_range_of_a_section_is_a_limit_like_any_other(target: tuple, rng: np.random.Generator) -> None:
     """One section may bend by 170 degrees, less than these limits of the muscles allow: the search slides along that.
 

@@ -506,6 +506,7 @@ def test_a_rod_in_space_under_forces_and_moments_converges_in_second_order(name:
     assert angles[1].max() < 4e-3
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("gravity", "tilt"), [((0, 0, -9.81), 0.3), ((6.0, -3.0, 0.0), 0.0)])
 @pytest.mark.parametrize("name", SPATIAL)
 def test_self_weight_is_that_of_a_heavy_rod(name: str, gravity: tuple, tilt: float) -> None:

@@ -189,6 +189,7 @@ def test_the_unit_of_loads_beside_the_weight_of_the_robot_is_told_by_another_fit
         assert (any(re.search(words, text) for text in told)) if words else told == []
 
 
+@pytest.mark.study
 def test_the_unit_of_loads_that_a_stiffness_absorbs_is_told_by_its_ratio() -> None:
     """Of a robot without weight the stiffness absorbs all of it."""
     random, robot = np.random.default_rng(1), sr.InflatableArm(stiffness=180.0)
@@ -251,7 +252,7 @@ def test_reversed_actuators_that_other_parameters_hide_are_told() -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(5, 200)
+@pytest.mark.shortened(3, 200)
 def test_a_noisy_fit_is_not_called_mirrored(cases: int) -> None:
     """Noise of 10 to 30 % of the motion; every other arm has links of other lengths than those told."""
     tried = 0

@@ -152,6 +152,7 @@ def test_given_lengths_need_no_more_than_tensions_known_to_suffice(rng: np.rando
         assert size <= 1.0001 * np.linalg.norm(tensions) + 1e-5
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("kind", ["length", "elastic"])
 def test_a_workspace_has_only_what_tendons_can_hold(kind: str) -> None:
     """Every sample, solved again, is within all limits: none pushes; the others are counted as refused."""
@@ -227,6 +228,7 @@ def loaded(arm: sr.SoftModel, rng: np.random.Generator) -> tuple[np.ndarray, sr.
     return force, sr.solve_equilibrium(arm, still.q_motors, force, gravity=still.load.gravity, tolerance=1e-12)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("name", FELT)
 def test_a_load_is_read_from_tensions(name: str, rng: np.random.Generator) -> None:
     """Forward and back: the force comes back to the tolerance of the torques, 1e-10, over the least singular value."""

@@ -203,7 +203,7 @@ def right(case: str) -> TendonRod:
 
 
 @pytest.mark.parametrize(
-    "case", [*(pytest.param(name, marks=pytest.mark.study) for name in ("straight", "corners")), "helical", "three segments"]
+    "case", [*(pytest.param(name, marks=pytest.mark.study) for name in ("straight", "corners", "helical")), "three segments"]
 )
 def test_sections_converge_to_rucker_and_webster(case: str) -> None:
     """Tip, lengths of the tendons and direction: second order in the number of sections of a rod that bends by 1 to 2.5 rad."""

@@ -26,6 +26,7 @@ def broken(urdf: str) -> dict[str, tuple[str, ...]]:
     return {finding.what: finding.problems for finding in check_rules(urdf) if not finding.ok}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
 def test_the_shipped_files_keep_every_rule(file: Path) -> None:
     findings = check_description(file)

@@ -36,10 +36,8 @@ MORE: Mapping[str, Callable[[], Case]] = {
 LOOPED = {name: make for name, make in CASES.items() if name not in ("side branches", "plateau")} | MORE
 
 
-QUICK = ("helix", "long arm")
-
-
-@pytest.mark.parametrize("kind", [one if one in QUICK else pytest.param(one, marks=pytest.mark.study) for one in LOOPED])
+@pytest.mark.study
+@pytest.mark.parametrize("kind", LOOPED)
 def test_cases_of_other_parameters_are_robots_that_were_built_with_them(kind: str) -> None:
     """Equilibria; and derivatives are differences of those, along a change of motors, force and parameters at once."""
     case = LOOPED[kind]()

@@ -167,7 +167,7 @@ def test_a_wrist_behind_muscles_holds_poses() -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(24, 250)
+@pytest.mark.shortened(12, 250)
 def test_poses_of_random_motors_are_reached_under_load_all(wristed: sr.SoftModel, cases: int) -> None:
     check_reached(wristed, cases, 11)
     check_reached(sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.4, 0.3), wrist=(0.0, 0.1))), cases // 12, 12)
