@@ -112,16 +112,10 @@ def test_balance_of_curves_in_a_rod(rng: np.random.Generator) -> None:
         assert np.abs(torques).max() < 1e-9  # of springs of 4 N m/rad and tensions of 30 N
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        *("tendons", "lumped_coils"),
-        *(
-            pytest.param(name, marks=pytest.mark.study)
-            for name in ("winding", "winding_lengths", "on_an_arm", "lumped_winding")
-        ),
-    ],
-)
+MORE = ("winding", "winding_lengths", "on_an_arm", "lumped_winding")
+
+
+@pytest.mark.parametrize("name", ["tendons", "lumped_coils", *(pytest.param(name, marks=pytest.mark.study) for name in MORE)])
 def test_what_actuators_do_and_feel(name: str, rng: np.random.Generator) -> None:
     """The Jacobian and loads are those of Pinocchio's path; loads change by a force as differences say."""
     model, search = robot(name), searching(name, gravity=True)

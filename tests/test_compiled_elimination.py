@@ -338,13 +338,12 @@ def compare_with_pinocchio(model: SoftModel, gravity: np.ndarray | None, rng: np
 GRAVITY = np.array([0.5, -1.0, -9.6])
 
 
+MORE = ("helix_lumped", "helix", "odd", "pcc_forces", "stacked", "tendons")
+QUICK = (("uneven", False), ("arm", True), ("coils", True))
+
+
 @pytest.mark.parametrize(
-    ("kind", "weight"),
-    [
-        *(("uneven", False), ("arm", True), ("coils", True)),
-        *(pytest.param("helix_lumped", False, marks=pytest.mark.study), pytest.param("pcc", False, marks=pytest.mark.study)),
-        *(pytest.param(kind, True, marks=pytest.mark.study) for kind in ("helix", "odd", "pcc_forces", "stacked", "tendons")),
-    ],
+    ("kind", "weight"), [*QUICK, *(pytest.param(kind, kind != "helix_lumped", marks=pytest.mark.study) for kind in MORE)]
 )
 def test_the_step_is_that_of_the_dense_tangent(kind: str, weight: bool, rng: np.random.Generator) -> None:
     compare_with_pinocchio(robot(kind), GRAVITY if weight else None, rng)
