@@ -124,8 +124,9 @@ def test_a_killed_run_goes_on_to_the_same_bytes(
 # --- Interrupted
 
 
+@pytest.mark.study
 @pytest.mark.usefixtures("small_blocks")
-@pytest.mark.parametrize("threads", [pytest.param(1, marks=pytest.mark.study), 2])
+@pytest.mark.parametrize("threads", [1, 2])
 def test_a_map_goes_on_from_what_is_done(
     threads: int, arm: sr.SoftModel, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

@@ -141,6 +141,7 @@ def test_pcc_jacobian_is_the_derivative_of_the_pose(frame: str, answer) -> None:
     assert set(exact["units"]["jacobian"].split()) >= {"m/m", "rad/m"}
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(
     "options",
     [

@@ -25,6 +25,7 @@ def answer(words: list[str], capsys: pytest.CaptureFixture) -> dict[str, Any]:
     return json.loads(capsys.readouterr().out)
 
 
+@pytest.mark.study
 def test_a_release_is_that_of_the_library(arm: sr.SoftModel, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     """Every file holds the same motion; the text names what a person wants to know."""
     file, motors = tmp_path / "m.npz", (0.3, 0.6, -0.8)

@@ -80,6 +80,7 @@ def slopes(q_motors: np.ndarray, masses: np.ndarray) -> np.ndarray:
     return found
 
 
+@pytest.mark.study
 @law("informative_poses", "InformativePoses")
 @given(seeds_)
 @settings(max_examples=2, deadline=None)

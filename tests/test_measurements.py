@@ -403,6 +403,7 @@ def measured(draw: st.DrawFn, n: int | None = None) -> sr.Measurements:
     return sr.Measurements(rows(2), std=std, **arguments)
 
 
+@pytest.mark.study
 @law("Measurements")
 @settings(max_examples=40)
 @given(rows=measured())

@@ -190,6 +190,7 @@ def test_sections_converge_to_a_rod_with_guided_tendons(moment: float) -> None:
 # --- The compiled path
 
 
+@pytest.mark.study
 @pytest.mark.parametrize("muscles", ["lengths", "forces"])
 @pytest.mark.parametrize("fields", [{"elastic_sections": 2}, {"chain": "lumped", "hinges": 2}], ids=["sections", "lumped"])
 def test_compiled_solvers_find_the_same_twisted_arm(muscles: str, fields: dict, rng: np.random.Generator) -> None:

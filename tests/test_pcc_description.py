@@ -197,6 +197,7 @@ def test_muscle_lengths_of_the_theory_put_the_tip_where_it_says() -> None:
     assert np.allclose(tip.translation, (0.44957382, -0.31544214, 0.84384418), atol=6e-9)
 
 
+@pytest.mark.study
 @pytest.mark.parametrize(("rule", "counts"), [("corrected", (4, 8, 16)), ("midpoint", (4, 8, 16))])
 def test_lumped_chain_converges_at_second_order(rule: str, counts: tuple[int, ...]) -> None:
     """Position *and* orientation of the tip under an imposed strain with twist and stretch.

@@ -202,9 +202,8 @@ def right(case: str) -> TendonRod:
     return CASES[case].solution()
 
 
-@pytest.mark.parametrize(
-    "case", [*(pytest.param(name, marks=pytest.mark.study) for name in ("straight", "corners", "helical")), "three segments"]
-)
+@pytest.mark.study
+@pytest.mark.parametrize("case", CASES)
 def test_sections_converge_to_rucker_and_webster(case: str) -> None:
     """Tip, lengths of the tendons and direction: second order in the number of sections of a rod that bends by 1 to 2.5 rad."""
     counts = {"helical": (8, 16), "three segments": (2, 4)}.get(case, (4, 8))
