@@ -22,7 +22,7 @@ pytestmark = pytest.mark.study
 def test_ik_trajectory_with_every_method(method: str, tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     folder = tmp_path / "out"
     plots = [] if method == "newton" else ["--no-plots"]
-    assert run_script("ik_trajectory", ["--output", str(folder), "--method", method, "--steps", "60", *plots]) == 0
+    assert run_script("ik_trajectory", ["--output", str(folder), "--method", method, "--steps", "24", *plots]) == 0
     names = {path.name for path in folder.iterdir()}
     drawn = {"poses.png", "motor_angles.png", "tip_errors.png", "link_moments.png"}
     assert names == {
@@ -37,20 +37,20 @@ def test_ik_trajectory_with_every_method(method: str, tmp_path: Path, capsys: py
     out, err = capsys.readouterr()
     assert "largest moment at link 1" in out
     assert str(folder) in out
-    assert "60/60" in err  # a progress bar
+    assert "24/24" in err  # a progress bar
 
 
 def test_ik_trajectory_turns_a_hand_on_a_wrist(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     """Poses, compensated to 1e-9 m and 1e-9 rad, also of equilibria solved anew (to 1e-10 themselves); and from a file."""
     folder = tmp_path / "out"
-    assert run_script("ik_trajectory", ["--wrist", "--output", str(folder), "--steps", "40", "--gravity"]) == 0
+    assert run_script("ik_trajectory", ["--wrist", "--output", str(folder), "--steps", "16", "--gravity"]) == 0
     names = {path.name for path in folder.iterdir()}
     drawn = {"poses.png", "motor_angles.png", "tip_errors.png", "orientation_errors.png", "link_moments.png"}
     results = {"trajectory.npz", "rigid.npz", "uncompensated.npz", "trajectory.csv", "summary.json", "scene.html"}
     assert names == results | drawn
     saved, summary = sr.load_result(folder / "trajectory.npz"), json.loads((folder / "summary.json").read_text())
     assert saved.model.n_motors == 6
-    assert saved.orientations.shape == (41, 3, 3)
+    assert saved.orientations.shape == (17, 3, 3)
     assert summary["verified_tip_error_m"] < 1.1e-9
     assert summary["verified_orientation_error_rad"] < 1.1e-9
     assert summary["orientation_error_uncompensated_rad"] > 0.05
