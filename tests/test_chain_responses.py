@@ -11,7 +11,7 @@ import softrobots as sr
 from softrobots.learning import force_batches
 from softrobots.learning.chain_responses import ChainResponses
 from softrobots.learning.differentiable import Differentiable
-from tests.support.learning_cases import CASES, OPTIONS, changes, solved
+from tests.support.learning_cases import CASES, OPTIONS, balanced, changes
 from tests.support.routed_robots import ROBOTS as ROUTED
 from tests.support.serial_chains import ROBOTS
 
@@ -108,8 +108,12 @@ RANDOM: dict[str, tuple[Any, tuple[str, ...]]] = {
 @pytest.mark.study
 @pytest.mark.shortened(14, 280)
 def test_rates_by_parameters_are_differences_of_solved_robots(cases: int) -> None:
-    """Along random changes of actuators, force and all parameters at once; the transposed gradient is the same number."""
+    """Along random changes of actuators, force and all parameters at once; the transposed gradient is the same number.
+
+    Where a tendon comes off slack there is a kink and no slope: one of the 280 cases.
+    """
     random, step = np.random.default_rng(31), 3e-4  # of differences of fourth order of changes of a fiftieth
+    kinks = 0
     for robot, names in RANDOM.values():
         model = sr.load_model(robot)
         solver = Differentiable("equilibrium", sr.compile(model, backend="python"), names, **OPTIONS)
@@ -123,15 +127,21 @@ def test_rates_by_parameters_are_differences_of_solved_robots(cases: int) -> Non
             results = solver.solve(*inputs)
             pushed = np.concatenate(solver.push(inputs, results, rates))
             ends = [
-                solved(solver, [a + n * step * b for a, b in zip(inputs, rates, strict=True)], results[0])
+                balanced(solver, [a + n * step * b for a, b in zip(inputs, rates, strict=True)], results[0])
                 for n in (-2, -1, 1, 2)
             ]
-            slope = np.array([1.0, -8.0, 8.0, -1.0]) @ ends / (12.0 * step)
+            taut = np.array([one.muscle_forces > 0.0 for one in ends])
+            if np.any(taut != taut[0]):
+                kinks += 1
+                continue
+            there = [np.concatenate([one.q_springs, one.tip_position]) for one in ends]
+            slope = np.array([1.0, -8.0, 8.0, -1.0]) @ there / (12.0 * step)
             assert pushed == pytest.approx(slope, abs=1e-8 * (1.0 + np.abs(slope).max())), robot
             weights = [random.normal(size=part.shape) for part in results]
             pulled = solver.pull(inputs, results, weights, [(), (), ()])
             back = sum(float((np.asarray(a) * b).sum()) for a, b in zip(pulled, rates, strict=True))
             assert back == pytest.approx(float(np.concatenate(weights) @ pushed), rel=1e-9, abs=1e-9 * np.abs(pushed).max())
+    assert kinks <= 2
 
 
 @pytest.mark.parametrize(

@@ -70,12 +70,17 @@ CASES: Mapping[str, Callable[[], Case]] = {
 }  # fmt: skip
 
 
-def solved(solver: Differentiable, inputs: list[FloatArray], start: Any = None) -> FloatArray:
-    """Elastic coordinates and tip by `solve_equilibrium`."""
+def balanced(solver: Differentiable, inputs: list[FloatArray], start: Any = None) -> sr.Equilibrium:
+    """The equilibrium by `solve_equilibrium`."""
     parameters = solver._set
     model = parameters.model(inputs[2])
     motors = inputs[0] + parameters.motor_offsets(inputs[2])
-    found = sr.solve_equilibrium(model, motors, inputs[1], gravity=sr.EARTH_GRAVITY, q_springs0=start, tolerance=1e-13)
+    return sr.solve_equilibrium(model, motors, inputs[1], gravity=sr.EARTH_GRAVITY, q_springs0=start, tolerance=1e-13)
+
+
+def solved(solver: Differentiable, inputs: list[FloatArray], start: Any = None) -> FloatArray:
+    """Elastic coordinates and tip by `solve_equilibrium`."""
+    found = balanced(solver, inputs, start)
     return np.concatenate([found.q_springs, found.tip_position])
 
 
