@@ -130,6 +130,17 @@ def test_a_frame_that_is_not_the_one_measured_is_told() -> None:
     assert hints(sr.identify(arm, right, "base.position")) == []
 
 
+def test_a_value_far_from_its_prior_is_told(tips: Any) -> None:
+    """A stiffness that the tips tell: four standard deviations from a prior is far, three is not."""
+    rows = sr.Measurements(MOTORS, gravity=(0, 0, -9.81), tip_position=tips, std={"tip_position": 1e-4})
+    robot, name = sr.InflatableArm(link_lengths=(0.5, 0.3)), "link[1].stiffness"
+    true = float(sr.load_model(robot).stiffness[0])
+    for sizes, told in ((4.0, 1), (-4.0, 1), (3.0, 0)):
+        found = hints(sr.identify(robot, rows, name, priors={name: (true - sizes * 10.0, 10.0)}))
+        assert len(found) == told, found
+        assert not told or f"{name} {sizes:+.2g};" in found[0]
+
+
 def test_positions_that_nothing_explains_are_told_with_their_share(tips: Any) -> None:
     """Rows in another order than the commands, far beyond the standard deviation that was given."""
     arm = sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.3)))

@@ -116,7 +116,7 @@ def identify(
         if not len(weights.rows()):
             raise ParameterError("measurements", measurements, "with at least one number in a row that counts")
         robust = loss if weights.known else "linear"
-        if every > 1 and not in_order:
+        if every > 1:
             few = Predictor(chosen, rows[::every])
             quick = _best(few, weights.every(every), prior, robust, steps, values, most)
             values, message = [quick.values], quick.message

@@ -11,9 +11,10 @@ Curtis, M. J. D. Powell, J. K. Reid, IMA Journal of Applied Mathematics 13:117-1
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
+from weakref import WeakSet
 
 import numpy as np
 
@@ -33,7 +34,8 @@ _UPWARDS: Stencil = (1e-5, {1: 2.0, 2: -0.5})
 _DOWNWARDS: Stencil = (1e-5, {-1: -2.0, -2: 0.5})
 _TYPICAL = {"m": 0.1, "Pa": 1e3}  # scales of parameters that may be zero, by unit; else 1
 _PLACED = ("placements", "frames")
-_MANY = 8  # parameters, from which on it pays to look for those that change different numbers
+_MANY = 8  # parameters, from which on it pays to look for those that change different numbers, also if asked once
+_SEEN = WeakSet[ParameterSet]()  # sets that were asked for
 _ASIDE = 1e-3  # how far from the present values they are told, relative: by symmetry some change nothing there
 
 
@@ -83,45 +85,72 @@ def model_change(parameters: ParameterSet, values: Any = None, *, fourth_order: 
 def _change(parameters: ParameterSet, values: tuple[float, ...], fourth_order: bool) -> ModelChange:
     at = np.array(values)
     base, columns = numbers_of(parameters.model(at)), dict[str, FloatArray]()
+    for place, name, slope in number_slopes(parameters, at, parameters.numbers, base, fourth_order=fourth_order):
+        column = _twists(base[name], slope) if name in _PLACED else slope.ravel()
+        columns.setdefault(name, np.zeros((column.size, len(at))))[:, place] = column
+    return ModelChange(len(at), columns)
 
-    def add(group: Mapping[int, Numbers]) -> None:
+
+def number_slopes(
+    parameters: ParameterSet,
+    at: FloatArray,
+    numbers: Callable[[FloatArray], Numbers],
+    base: Numbers,
+    *,
+    fourth_order: bool = False,
+) -> Iterator[tuple[int, str, FloatArray]]:
+    """Yield by number of the parameter and name of the array the derivatives that are not zero.
+
+    Args:
+        parameters: The parameters.
+        at: Their values, shape (P,).
+        numbers: Returns named arrays at values; a function that is asked again and again.
+        base: These arrays there.
+        fourth_order: Whether central differences are of fourth order.
+
+    Raises:
+        ParameterError: As `model_change` does.
+    """
+
+    def each(group: Mapping[int, Numbers]) -> Iterator[tuple[int, str, FloatArray]]:
         places = list(group)
-        some, scales = [parameters.parameters[place] for place in places], _scales(parameters, at)[places]
+        scales = _scales(parameters, at)[places]
 
-        def numbers(steps: float) -> Numbers:
+        def moved(steps: float) -> Numbers:
             changed = at.copy()
             changed[places] += steps * scales
-            return model_numbers(parameters.model(changed))
+            return numbers(changed)
 
-        slopes = _relative(some, at[places], scales, base, numbers, fourth_order)
+        slopes = _relative([parameters.parameters[place] for place in places], at[places], scales, base, moved, fourth_order)
         for (place, touched), scale in zip(group.items(), scales.tolist(), strict=True):
             for name, slope in slopes.items():
                 own = slope * touched[name] / scale if len(group) > 1 else slope / scale
                 if np.any(own):
-                    column = _twists(base[name], own) if name in _PLACED else own.ravel()
-                    columns.setdefault(name, np.zeros((column.size, len(at))))[:, place] = column
+                    yield place, name, own
 
-    for group in _apart(parameters):
+    places = np.flatnonzero(parameters.of_model).tolist()
+    alone: list[dict[int, Numbers]] = [{place: {}} for place in places]
+    groups = _apart(parameters, numbers) if len(places) >= _MANY or parameters in _SEEN else alone
+    _SEEN.add(parameters)
+    for group in groups or alone:
         try:
-            add(group)
+            yield from list(each(group))
         except ParameterError:  # one of them has no room on one side
             for place, touched in group.items():
-                add({place: touched})
-    return ModelChange(len(at), columns)
+                yield from each({place: touched})
 
 
 @lru_cache(maxsize=4)
-def _apart(parameters: ParameterSet) -> list[dict[int, Numbers]]:
+def _apart(parameters: ParameterSet, numbers: Callable[[FloatArray], Numbers]) -> list[dict[int, Numbers]]:
     """Groups of parameters that change the model of which no two change the same number, by place, with what each changes."""
-    places = np.flatnonzero(parameters.of_model).tolist()
     groups: list[dict[int, Numbers]] = []
     random, step = np.random.default_rng(0), _ASIDE * _scales(parameters, parameters.values)
     step = np.where(parameters.values + 2.0 * step < parameters.upper, step, -step)
     aside = parameters.values + random.uniform(0.5, 1.0, len(step)) * step * parameters.of_model
     try:
-        base = model_numbers(parameters.model(aside)) if len(places) >= _MANY else {}
-        for place in places if base else ():
-            moved = model_numbers(parameters.model(aside + np.where(np.arange(len(step)) == place, step, 0.0)))
+        base = numbers(aside)
+        for place in np.flatnonzero(parameters.of_model).tolist():
+            moved = numbers(aside + np.where(np.arange(len(step)) == place, step, 0.0))
             touched = {name: moved[name] != base[name] for name in base}
             for group in groups:
                 if not any(np.any(touched[name] & other[name]) for other in group.values() for name in base):
@@ -130,8 +159,8 @@ def _apart(parameters: ParameterSet) -> list[dict[int, Numbers]]:
             else:
                 groups.append({place: touched})
     except (SoftRobotsError, ValueError):  # the robot refuses values there, or has numbers of other shapes
-        groups = []
-    return groups or [{place: {}} for place in places]
+        return []
+    return groups
 
 
 @lru_cache(maxsize=32)

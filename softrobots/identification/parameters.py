@@ -32,6 +32,7 @@ from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.identification.parameter_names import Kind, Parameter, Registry
 from softrobots.model.loader import load_arguments, load_model, with_springs
+from softrobots.model.numbers import Numbers, model_numbers
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots import AssumedStiffnessWarning
 from softrobots.robots.variants import Variants
@@ -153,6 +154,10 @@ class ParameterSet:
         """
         numbers = finite_array("values", values, (len(self.parameters),))
         return self._models(tuple(np.where(self.of_model, numbers, 0.0).tolist()))
+
+    def numbers(self, values: FloatArray) -> Numbers:
+        """Return `model_numbers` of the robot with values, shape (P,); raises the same errors."""
+        return model_numbers(self.model(values))
 
     def __getstate__(self) -> dict[str, Any]:
         """Return what a copy keeps: all but the last models."""

@@ -48,6 +48,7 @@ _SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; ot
 _MUCH = 0.1  # share of the variance that no robot with the right columns leaves
 _TO_STD = 1.4826  # standard deviation of normal numbers over the median of their size
 _BADLY = 2.0  # times the standard deviation that was given, above which noise alone is no explanation
+_FAR = 3.5  # standard deviations of its prior; of 50 parameters one is farther off in one of 40 fits
 _EARTH = (9.76, 9.84)  # gravity on the ground [m/s^2]
 
 
@@ -84,7 +85,7 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
                     f"{key}: what is left is {ratio:.2g} times the standard deviation that was given: the robot differs in "
                     "what is not fitted, or the standard deviation is larger; the intervals by rows are too narrow"
                 )
-    return texts
+    return texts + _far_from_priors(found)
 
 
 def suspicions(
@@ -166,6 +167,19 @@ def doubtful_sizes(measurements: Measurements, model: SoftModel) -> list[str]:
         if size and not _EARTH[0] < size < _EARTH[1]:
             found.append(f"gravity is {size:.4g} m/s^2, on the ground 9.81: is the unit right?")
     return found
+
+
+def _far_from_priors(found: Identification) -> list[str]:
+    """The parameters that end far from what was known of them before."""
+    off = {name: (found.values[name] - mean) / std for name, (mean, std) in found.priors.items()}
+    far = sorted((name for name in off if abs(off[name]) > _FAR), key=lambda name: -abs(off[name]))
+    if not far:
+        return []
+    named = ", ".join(f"{name} {off[name]:+.2g}" for name in far[:6]) + (f" and {len(far) - 6} more" if far[6:] else "")
+    return [
+        f"far from what was known before, in standard deviations of the prior: {named}; are the sizes of the robot and the "
+        "priors right, and order and sign of the actuators?"
+    ]
 
 
 def _other_frame(found: Identification, key: str, rows: Measurements, before: float) -> list[str]:

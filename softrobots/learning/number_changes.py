@@ -14,8 +14,9 @@ from softrobots.compiled.run.responses import Responses
 from softrobots.compiled.trace.numbers import NumberInputs, numbers_of
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
-from softrobots.identification.model_change import differences
+from softrobots.identification.model_change import number_slopes
 from softrobots.identification.parameters import ParameterSet
+from softrobots.model.numbers import Numbers
 
 
 class NumberChanges:
@@ -29,7 +30,7 @@ class NumberChanges:
         """
         self._parameters, self._backend, self._weight = parameters, backend, weight
         self._chain = parameters.present.chain()
-        self.numbers, self.slopes = lru_cache(maxsize=16)(self._numbers), lru_cache(maxsize=4)(self._slopes)
+        self.numbers, self.slopes = lru_cache(maxsize=1 << 12)(self._numbers), lru_cache(maxsize=4)(self._slopes)
         present = tuple(parameters.values.tolist())
         constant = numbers_of(self._chain)
         self._inputs = NumberInputs(constant, ~np.isin(constant, (0.0, 1.0, -1.0)) | np.any(self.slopes(present), axis=1))
@@ -67,12 +68,11 @@ class NumberChanges:
 
     def _slopes(self, values: tuple[float, ...]) -> FloatArray:
         """Return the derivatives of the numbers by the parameters, shape (n, P); zero of those that do not change the model."""
-        base = {"numbers": self._numbers(values)}
+        base = self._named(np.array(values))
         slopes = np.zeros((base["numbers"].size, len(values)))
-        for place in np.flatnonzero(self._parameters.of_model).tolist():
-
-            def at(value: float, place: int = place) -> dict[str, FloatArray]:
-                return {"numbers": self._numbers((*values[:place], value, *values[place + 1 :]))}
-
-            slopes[:, place] = differences(self._parameters.parameters[place], values[place], base, at)["numbers"]
+        for place, _, slope in number_slopes(self._parameters, np.array(values), self._named, base):
+            slopes[:, place] = slope
         return slopes
+
+    def _named(self, values: FloatArray) -> Numbers:
+        return {"numbers": self.numbers(tuple(values.tolist()))}
