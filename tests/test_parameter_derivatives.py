@@ -11,9 +11,10 @@ import pytest
 import softrobots as sr
 from softrobots.core.checks import FloatArray
 from softrobots.identification.derivatives.rows_and_states import Outputs, States
-from softrobots.identification.model_change import model_change
+from softrobots.identification.model_change import differences, model_change
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
+from softrobots.model.numbers import model_numbers
 from tests.support.foreign import BRANCHED, SPRINGS
 
 FORCES = {"force": (0.0, 10.0, -11.0), "gravity": sr.EARTH_GRAVITY}
@@ -121,3 +122,27 @@ def test_derivatives_are_those_of_solved_equilibria(kind: str) -> None:
             slopes @ along, solved, rtol=0.0, atol=1e-8 * max(float(np.abs(solved).max(initial=0.0)), 1e-3)
         )
     assert counts.all()
+
+
+@pytest.mark.study
+def test_parameters_that_move_at_once_have_the_derivatives_that_they_have_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Of values of single tendons, away from those of the robot, with half as many robots loaded at most."""
+    names = ("young_modulus", "tendon[*].tendon_stiffness", "tendon[*].tendon_distance", "tendon[*].tendon_azimuth_deviation")
+    robot = sr.TendonArm(segment_lengths=(0.06, 0.06), elastic_sections=1)
+    parameters = ParameterSet.of(robot, names)
+    values = parameters.values + 0.02 * np.where(parameters.values == 0.0, 1.0, parameters.values)
+    loads: list[float] = []
+    load = ParameterSet.model
+    monkeypatch.setattr(ParameterSet, "model", lambda self, at: loads.append(1.0) or load(self, at))
+    model_change(parameters, 0.99 * values)  # the first tells which numbers each changes
+    loads.clear()
+    change = model_change(parameters, values)
+    assert len(loads) <= len(values)  # twice as many and one where each moves alone
+    base, at = model_numbers(parameters.model(values)), dict[str, FloatArray]()
+    for place, one in enumerate(parameters.parameters):
+        row = np.arange(len(values)) == place
+        alone = differences(one, values[place], base, lambda v, row=row: parameters.numbers(np.where(row, v, values)))
+        for name in ("laws", "path_arms", "stiffness", "path_rest"):
+            at.setdefault(name, np.zeros((base[name].size, len(values))))[:, place] = alone[name].ravel()
+    for name, slopes in at.items():  # the same two robots in both, of which numbers differ in rounding at most
+        np.testing.assert_allclose(change.by_number.get(name, np.zeros_like(slopes)), slopes, rtol=1e-9, atol=1e-12)

@@ -122,6 +122,8 @@ def number_slopes(
             return numbers(changed)
 
         slopes = _relative([parameters.parameters[place] for place in places], at[places], scales, base, moved, fourth_order)
+        if len(group) > 1 and any(np.any(slopes[name] * (sum(one[name] for one in group.values()) == 0)) for name in slopes):
+            raise ParameterError("parameters", places, "of which each changes the numbers that it is known to change")
         for (place, touched), scale in zip(group.items(), scales.tolist(), strict=True):
             for name, slope in slopes.items():
                 own = slope * touched[name] / scale if len(group) > 1 else slope / scale
@@ -135,7 +137,7 @@ def number_slopes(
     for group in groups or alone:
         try:
             yield from list(each(group))
-        except ParameterError:  # one of them has no room on one side
+        except ParameterError:  # one of them has no room on one side, or changes more here
             for place, touched in group.items():
                 yield from each({place: touched})
 
