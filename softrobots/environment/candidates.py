@@ -13,7 +13,7 @@ from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
-from softrobots.environment.single_bodies import Seen, inner
+from softrobots.environment.single_bodies import Seen, Triple, inner
 from softrobots.environment.single_pairs import single_pair
 
 _NOBODY = np.zeros(0, dtype=np.intp)
@@ -25,65 +25,77 @@ INSIDE = 2
 Columns = tuple[Any, Any, Any, FloatArray, FloatArray, FloatArray]
 """Capsule, obstacle, feature, point, distance and normal of candidates as arrays, see `Candidates`."""
 
-Plain = tuple[list[tuple[int, int, int]], list[tuple[Any, float, Any]]]
-"""The same in plain numbers: capsule, obstacle and feature of each candidate; point, distance and normal of each."""
-
 
 class Candidates:
-    """Candidates, sorted by field: as arrays or in plain numbers, each made of the other where it is asked."""
+    """Candidates, sorted by field; few are in plain numbers, many in arrays, and each is read in both ways."""
 
-    def __init__(self, parts: list[tuple[Field, Any]], given: Columns | Plain) -> None:
-        """Take fields, with the body of each of their candidates there, and one of both forms."""
-        self.parts, self.given = parts, given
+    def __init__(self, parts: list[tuple[Field, Any]], numbers: Any, points: Any, distances: Any, normals: Any) -> None:
+        """Take fields, with the body of each of their candidates there, and of each candidate what the properties return.
+
+        Args:
+            parts: The fields.
+            numbers: Capsule, obstacle and feature of each candidate: a list of triples, or three arrays of integers.
+            points: Their points, a list or an array, like distances and normals.
+            distances: Their distances [m].
+            normals: Their normals.
+        """
+        self.parts, self.given = parts, (parts, numbers, points, distances, normals)
+
+    @property
+    def few(self) -> bool:
+        """Whether they are in plain numbers."""
+        return isinstance(self.given[1], list)
 
     @cached_property
-    def plain(self) -> Plain:
-        """In plain numbers."""
-        if len(self.given) == 2:
-            return self.given
-        lists = [column.tolist() for column in self.given]
-        return list(zip(*lists[:3], strict=True)), list(zip(*lists[3:], strict=True))
+    def keys(self) -> tuple[tuple[int, int, int], ...]:
+        """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next.
+
+        Numbers of obstacles beyond the last are capsules of the robot itself: the number less that of obstacles.
+        """
+        numbers = self.given[1]
+        return tuple(numbers if self.few else zip(*(column.tolist() for column in numbers), strict=True))
+
+    def row(self, place: int) -> tuple[Triple, float, Triple]:
+        """Point, distance and normal of one candidate in plain numbers."""
+        _, _, points, distances, normals = self.given
+        if self.few:
+            return points[place], distances[place], normals[place]
+        return points[place].tolist(), float(distances[place]), normals[place].tolist()
 
     @cached_property
-    def columns(self) -> Columns:
-        """As arrays."""
-        if len(self.given) != 2:
-            return self.given
-        keys, rows = self.given
-        points, distances, normals = zip(*rows, strict=True) if rows else ((), (), ())
-        capsules, obstacles, features = np.array(keys, dtype=np.intp).reshape(-1, 3).T
-        places = np.array(points).reshape(-1, 3), np.array(distances), np.array(normals).reshape(-1, 3)
-        return capsules, obstacles, features, *places
+    def numbers(self) -> Any:
+        """Capsule, obstacle and feature of the candidates, three arrays of shape (m,), integers."""
+        return np.array(self.keys, dtype=np.intp).reshape(-1, 3).T if self.few else self.given[1]
 
     @property
     def capsules(self) -> Any:
         """Capsule of each candidate, shape (m,), integers."""
-        return self.columns[0]
+        return self.numbers[0]
 
     @property
     def obstacles(self) -> Any:
         """Obstacle of each, shape (m,), integers."""
-        return self.columns[1]
+        return self.numbers[1]
 
     @property
     def features(self) -> Any:
         """Feature of each, shape (m,), integers: see `INSIDE`."""
-        return self.columns[2]
+        return self.numbers[2]
 
-    @property
+    @cached_property
     def core_points(self) -> FloatArray:
         """Material points of the cores, shape (m, 3) [m]."""
-        return self.columns[3]
+        return np.asarray(self.given[2], dtype=np.float64).reshape(-1, 3)
 
-    @property
+    @cached_property
     def distances(self) -> FloatArray:
         """Their distances from the obstacles, shape (m,) [m]."""
-        return self.columns[4]
+        return np.asarray(self.given[3], dtype=np.float64)
 
-    @property
+    @cached_property
     def normals(self) -> FloatArray:
         """Normals from obstacle to robot, shape (m, 3)."""
-        return self.columns[5]
+        return np.asarray(self.given[4], dtype=np.float64).reshape(-1, 3)
 
 
 def find_candidates(
@@ -117,9 +129,14 @@ def find_candidates(
         return found[0]
     parts = [part for one in found for part in one.parts]
     if not found or not any(len(which) for _, which in parts):
-        return Candidates([], ([], []))
-    columns: Any = tuple(np.concatenate(rows) for rows in zip(*(one.columns for one in found), strict=True))
-    return Candidates(parts, columns)
+        return _nothing()
+    numbers = tuple(np.concatenate(rows) for rows in zip(*(one.numbers for one in found), strict=True))
+    columns = zip(*((one.core_points, one.distances, one.normals) for one in found), strict=True)
+    return Candidates(parts, numbers, *(np.concatenate(rows) for rows in columns))
+
+
+def _nothing() -> Candidates:
+    return Candidates([], [], [], [], [])
 
 
 def _many(field: Field, numbers: Any, cores: Cores, places: CorePlaces, margin: float, merged: float) -> Candidates:
@@ -134,16 +151,16 @@ def _many(field: Field, numbers: Any, cores: Cores, places: CorePlaces, margin: 
         near, which = touching.nonzero()
         values = distances.take(near * len(numbers) + which)
         ones = cores.end_capsules.take(near), numbers.take(which), cores.end_features.take(near)
-        return Candidates([(field, which)], (*ones, ends.take(near, 0), values, field.normals.take(which, 0)))
+        return Candidates([(field, which)], ones, ends.take(near, 0), values, field.normals.take(which, 0))
     # the distance changes by at most the length of the way: what is far at both ends is far between them
     near, which = (np.add.reduce(distances.take(cores.end_numbers, 0), 1) <= (2.0 * margin + cores.ways)[:, None]).nonzero()
     if not len(near):
-        return Candidates([], ([], []))
+        return _nothing()
     counted = cores.counted.take(near, 0)
     if standing is not None:
         counted &= ~standing[cores.end_numbers[near], which[:, None]]
-    capsules, which, *others = _near(field, places, near, which, counted, limits, merged)
-    return Candidates([(field, which)], (capsules, numbers.take(which), *others))
+    capsules, which, features, *others = _near(field, places, near, which, counted, limits, merged)
+    return Candidates([(field, which)], (capsules, numbers.take(which), features), *others)
 
 
 def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArray) -> Any:
@@ -162,7 +179,7 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
 
 def _few_planes(field: HalfSpaces, numbers: Any, cores: Cores, ends: Any, margin: float) -> Candidates:
     """The same for few ends, a list of points, and half-spaces in plain numbers."""
-    bodies, keys, rows = list[int](), list[tuple[int, int, int]](), list[tuple[Any, float, Any]]()
+    bodies, keys, points, found, normals = list[int](), list[tuple[int, int, int]](), list[Any](), list[float](), list[Any]()
     planes = zip(numbers.tolist(), field.normals.tolist(), field.offsets.tolist(), strict=True)
     for which, (obstacle, normal, offset) in enumerate(planes):
         distances = [inner(end, normal) - offset for end in ends]
@@ -173,13 +190,15 @@ def _few_planes(field: HalfSpaces, numbers: Any, cores: Cores, ends: Any, margin
             if base is None or distances[base[0]] >= base[1]:  # else it stands there
                 bodies.append(which)
                 keys.append((capsule, obstacle, feature))
-                rows.append((ends[number], distance, normal))
-    return Candidates([(field, bodies)], (keys, rows))
+                points.append(ends[number])
+                found.append(distance)
+                normals.append(normal)
+    return Candidates([(field, bodies)], keys, points, found, normals)
 
 
 def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, merged: float) -> Candidates:
     """The same for few ends, a list of points, and the bodies of a field, with their numbers, in plain numbers."""
-    bodies, keys, rows = list[int](), list[tuple[int, int, int]](), list[tuple[Any, float, Any]]()
+    bodies, keys, points, found, normals = list[int](), list[tuple[int, int, int]](), list[Any](), list[float](), list[Any]()
     for which, obstacle in enumerate(numbers.tolist()):
         body: Any = field.single(which)
         bounds = [math.dist(end, body.centre) - body.around for end in ends]
@@ -207,8 +226,10 @@ def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, mer
                     continue
                 bodies.append(which)
                 keys.append((capsule, obstacle, feature))
-                rows.append((point, distance, body.out(normal)))
-    return Candidates([(field, bodies)], (keys, rows))
+                points.append(point)
+                found.append(distance)
+                normals.append(body.out(normal))
+    return Candidates([(field, bodies)], keys, points, found, normals)
 
 
 def _near(field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, limits: FloatArray, merged: float) -> Columns:
@@ -240,4 +261,4 @@ def _own(cores: Cores, places: CorePlaces, pairs: Any, margin: float, merged: fl
     capsules[ends], features[ends] = cores.end_capsules[numbers], cores.end_features[numbers]
     different = different_contacts(cores, field, capsules, features, which, points)
     capsules, which, features, *others = (column[different] for column in found)
-    return Candidates([(field, which)], (capsules, count + which, features, *others))
+    return Candidates([(field, which)], (capsules, count + which, features), *others)

@@ -15,12 +15,13 @@ the obstacle (edges, rims), which hold a core that lies flat, where the nearest 
 from __future__ import annotations
 
 import math
+from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.vectors import skew
+from softrobots.core.vectors import cross, skew
 from softrobots.environment.candidates import INSIDE, Candidates, find_candidates
 from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores, cores_of
 from softrobots.environment.environment import Environment, check_environment
@@ -53,29 +54,38 @@ class Gaps(Candidates):
         self, cores: Cores, places: CorePlaces, found: Candidates, transforms: FloatArray, reach: float, own: bool
     ) -> None:
         """Take candidates, transforms of obstacles to the world, shape (n, 4, 4), reach [m]; may the robot touch itself?"""
-        super().__init__(found.parts, found.given)
-        keys, self._rows = self.plain
-        self.keys: tuple[tuple[int, int, int], ...] = tuple(keys)
-        """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next. Numbers of
-        obstacles beyond the last are capsules of the robot itself: the number less that of obstacles."""
-        plain = found.given is self.plain
-        capsules = np.array([key[0] for key in keys], dtype=np.intp) if plain else self.capsules
-        distances = np.array([row[1] for row in self._rows]) if plain else self.distances
-        self.values: FloatArray = distances - cores.radii.take(capsules)
-        """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
+        super().__init__(*found.given)
         self._cores, self.places, self._transforms, self.reach = cores, places, transforms, reach
         self.with_itself = own
         """Whether the robot may touch itself."""
-        self.moves: FloatArray = cores.moves.take(capsules, 0)
+        self.values: FloatArray
+        """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
+        if self.few:
+            self.values = np.array([one - cores.plain[key[0]][2] for key, one in zip(self.keys, found.given[3], strict=True)])
+        else:
+            self.values = self.distances - self.radii
+
+    @cached_property
+    def moves(self) -> FloatArray:
         """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
 
-        Where the robot touches itself, less that of the other capsule."""
-        if own:
-            rows = (self.obstacles >= len(transforms)).nonzero()[0]
-            self.moves[rows] -= cores.moves[self.obstacles[rows] - len(transforms)]
-        wrenches = np.array([(*normal, *times(point, normal)) for point, _, normal in self._rows]).reshape(-1, 6)
-        self.jacobian: FloatArray = wrenches.dot(places.jacobian) * self.moves
+        Where the robot touches itself, less that of the other capsule.
+        """
+        moves = self._cores.moves.take([key[0] for key in self.keys] if self.few else self.capsules, 0)
+        if self.with_itself:
+            rows = (self.obstacles >= len(self._transforms)).nonzero()[0]
+            moves[rows] -= self._cores.moves[self.obstacles[rows] - len(self._transforms)]
+        return moves
+
+    @cached_property
+    def jacobian(self) -> FloatArray:
         """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
+        if self.few:
+            points, normals = self.given[2], self.given[4]
+            wrenches = np.array([(*n, *times(p, n)) for p, n in zip(points, normals, strict=True)]).reshape(-1, 6)
+        else:
+            wrenches = np.concatenate([self.normals, cross(self.core_points, self.normals)], axis=1)
+        return np.asarray(wrenches.dot(self.places.jacobian) * self.moves)
 
     def __len__(self) -> int:
         """Number of candidates."""
@@ -142,7 +152,7 @@ class Gaps(Candidates):
         own: list[int] = []
         for row in rows.tolist():
             capsule, other, _ = self.keys[row]
-            point, _, (a, b, c) = self._rows[row]
+            point, _, (a, b, c) = self.row(row)
             if surface is None:
                 force = values[row] * a, values[row] * b, values[row] * c
             else:
@@ -186,7 +196,7 @@ class Gaps(Candidates):
         while place >= len(which):
             place -= len(which)
             field, which = next(parts)
-        point, distance, normal = self._rows[row]
+        point, distance, normal = self.row(row)
         return field.bends(int(which[place]), point, distance, normal)
 
     def _curved(self, row: int, force: float) -> list[tuple[Any, float]]:
@@ -195,7 +205,7 @@ class Gaps(Candidates):
         Returns:
             Wrenches, force first, and weights `w` [N/m]: it is :math:`\sum w\,a^T a` with the torques `a` of the wrenches.
         """
-        (point, _, normal), bends = self._rows[row], self.bends(row)
+        (point, _, normal), bends = self.row(row), self.bends(row)
         found: list[tuple[Any, float]] = [((*way, *times(point, way)), force * weight) for way, weight in bends]
         capsule, _, feature = self.keys[row]
         if bends and feature == INSIDE:

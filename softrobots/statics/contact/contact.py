@@ -99,8 +99,8 @@ def contact_at(
 ) -> Contact:
     """Return the contact of a candidate, with its normal force [N], friction, shape (3,) [N], status and slip."""
     link, obstacle, with_itself = surroundings.pair(gaps, place)
-    core, distance, normal = gaps.plain[1][place]
-    core, normal = np.array(core), np.array(normal)
+    plain = gaps.row(place)
+    core, distance, normal = np.array(plain[0]), plain[1], np.array(plain[2])
     return Contact(
         link=link,
         obstacle=obstacle,

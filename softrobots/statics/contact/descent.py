@@ -223,7 +223,7 @@ class ContactSearch:
 
 def _moved(step: FloatArray) -> float:
     """How far a step of the springs moves the robot at most, relative to the reach."""
-    return norm(step) * math.sqrt(len(step))
+    return float(np.add.reduce(np.abs(step)))
 
 
 def _back_to_surface(touch: Touch, soft: FloatArray) -> FloatArray | None:
