@@ -13,7 +13,7 @@ from softrobots.environment.cores import CorePlaces, Cores
 from softrobots.environment.distance_fields import Field, HalfSpaces
 from softrobots.environment.nearest_points import core_points
 from softrobots.environment.self_contact import different_contacts, near_pairs, own_capsules
-from softrobots.environment.single_bodies import Seen, Triple, inner
+from softrobots.environment.single_bodies import Bends, Seen, Triple
 from softrobots.environment.single_pairs import single_pair
 
 _NOBODY = np.zeros(0, dtype=np.intp)
@@ -30,42 +30,37 @@ class Candidates:
     """Candidates, sorted by field; few are in plain numbers, many in arrays, and each is read in both ways."""
 
     def __init__(self, parts: list[tuple[Field, Any]], numbers: Any, points: Any, distances: Any, normals: Any) -> None:
-        """Take fields, with the body of each of their candidates there, and of each candidate what the properties return.
+        """Take fields, with the body of each of their candidates there, and all candidates, in lists or in arrays.
 
-        Args:
-            parts: The fields.
-            numbers: Capsule, obstacle and feature of each candidate: a list of triples, or three arrays of integers.
-            points: Their points, a list or an array, like distances and normals.
-            distances: Their distances [m].
-            normals: Their normals.
+        `numbers` are capsule, obstacle and feature of each: a list of triples, or three arrays of integers.
         """
-        self.parts, self.given = parts, (parts, numbers, points, distances, normals)
+        self.parts, self.given, self.few = parts, (numbers, points, distances, normals), isinstance(numbers, list)
 
-    @property
-    def few(self) -> bool:
-        """Whether they are in plain numbers."""
-        return isinstance(self.given[1], list)
-
-    @cached_property
-    def keys(self) -> tuple[tuple[int, int, int], ...]:
-        """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next.
-
-        Numbers of obstacles beyond the last are capsules of the robot itself: the number less that of obstacles.
-        """
-        numbers = self.given[1]
+    def keys_of_all(self) -> tuple[tuple[int, int, int], ...]:
+        """Capsule, obstacle and feature of each candidate in plain numbers."""
+        numbers = self.given[0]
         return tuple(numbers if self.few else zip(*(column.tolist() for column in numbers), strict=True))
 
     def row(self, place: int) -> tuple[Triple, float, Triple]:
         """Point, distance and normal of one candidate in plain numbers."""
-        _, _, points, distances, normals = self.given
+        _, points, distances, normals = self.given
         if self.few:
             return points[place], distances[place], normals[place]
         return points[place].tolist(), float(distances[place]), normals[place].tolist()
 
+    def bends(self, row: int, at: tuple[Triple, float, Triple]) -> Bends:
+        """Second derivative of the distance of a candidate, which is at what `row` returns, from its obstacle."""
+        place, parts = row, iter(self.parts)
+        field, which = next(parts)
+        while place >= len(which):
+            place -= len(which)
+            field, which = next(parts)
+        return field.bends(int(which[place]), *at)
+
     @cached_property
     def numbers(self) -> Any:
         """Capsule, obstacle and feature of the candidates, three arrays of shape (m,), integers."""
-        return np.array(self.keys, dtype=np.intp).reshape(-1, 3).T if self.few else self.given[1]
+        return np.array(self.given[0], dtype=np.intp).reshape(-1, 3).T if self.few else self.given[0]
 
     @property
     def capsules(self) -> Any:
@@ -85,17 +80,17 @@ class Candidates:
     @cached_property
     def core_points(self) -> FloatArray:
         """Material points of the cores, shape (m, 3) [m]."""
-        return np.asarray(self.given[2], dtype=np.float64).reshape(-1, 3)
+        return np.asarray(self.given[1], dtype=np.float64).reshape(-1, 3)
 
     @cached_property
     def distances(self) -> FloatArray:
         """Their distances from the obstacles, shape (m,) [m]."""
-        return np.asarray(self.given[3], dtype=np.float64)
+        return np.asarray(self.given[2], dtype=np.float64)
 
     @cached_property
     def normals(self) -> FloatArray:
         """Normals from obstacle to robot, shape (m, 3)."""
-        return np.asarray(self.given[4], dtype=np.float64).reshape(-1, 3)
+        return np.asarray(self.given[3], dtype=np.float64).reshape(-1, 3)
 
 
 def find_candidates(
@@ -180,10 +175,15 @@ def _standing(field: Field, cores: Cores, ends: FloatArray, distances: FloatArra
 def _few_planes(field: HalfSpaces, numbers: Any, cores: Cores, ends: Any, margin: float) -> Candidates:
     """The same for few ends, a list of points, and half-spaces in plain numbers."""
     bodies, keys, points, found, normals = list[int](), list[tuple[int, int, int]](), list[Any](), list[float](), list[Any]()
+    largest = max(cores.plain_radii, default=0.0)
     planes = zip(numbers.tolist(), field.normals.tolist(), field.offsets.tolist(), strict=True)
     for which, (obstacle, normal, offset) in enumerate(planes):
-        distances = [inner(end, normal) - offset for end in ends]
-        for number, (distance, (capsule, feature, radius)) in enumerate(zip(distances, cores.plain_ends, strict=True)):
+        a, b, c = normal
+        distances = [x * a + y * b + z * c - offset for x, y, z in ends]
+        for number, distance in enumerate(distances):
+            if distance > margin + largest:
+                continue
+            capsule, feature, radius = cores.plain_ends[number]
             if distance > margin + radius:
                 continue
             base = cores.base_of.get(number)
@@ -204,14 +204,16 @@ def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, mer
         bounds = [math.dist(end, body.centre) - body.around for end in ends]
         seen: dict[int, Seen] = {}
         for capsule, (both, counted, radius, length) in enumerate(cores.plain):
-            limit, (first, last) = margin + radius, both
-            if bounds[first] + bounds[last] > 2.0 * limit + length:
+            first, last = both
+            limit = margin + radius
+            most = 2.0 * limit + length
+            if bounds[first] + bounds[last] > most:
                 continue
             for number in both:
                 if number not in seen:
                     seen[number] = body.seen(ends[number])
             start, end = seen[first], seen[last]
-            if start.distance + end.distance > 2.0 * limit + length:
+            if start.distance + end.distance > most:
                 continue
             for feature, share, distance, normal in single_pair(body, start, end, length, limit, merged):
                 if feature >= INSIDE:

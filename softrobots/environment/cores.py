@@ -64,7 +64,8 @@ class Cores:
         """Take the capsules; those that never move are left out, because no equilibrium changes what they touch."""
         self.capsules = tuple(one for one in capsules if one.joint > 0)
         self.count = len(self.capsules)
-        self.radii = np.array([one.radius for one in self.capsules])
+        self.plain_radii = [one.radius for one in self.capsules]
+        self.radii = np.array(self.plain_radii)
         self.joints = np.array([one.joint for one in self.capsules], dtype=np.intp)
         self.lengths = np.array([float(np.linalg.norm(one.end - one.start)) for one in self.capsules])
         self.ways = 2.0 * self.radii + self.lengths

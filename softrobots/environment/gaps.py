@@ -15,7 +15,6 @@ the obstacle (edges, rims), which hold a core that lies flat, where the nearest 
 from __future__ import annotations
 
 import math
-from functools import cached_property
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -27,10 +26,11 @@ from softrobots.environment.cores import SAME_POINT, CorePlaces, Cores, cores_of
 from softrobots.environment.environment import Environment, check_environment
 from softrobots.environment.obstacle_fields import obstacle_fields, obstacle_transforms
 from softrobots.environment.self_contact import relative_curvature, self_contact_pairs
-from softrobots.environment.single_bodies import Bends, inner, times
+from softrobots.environment.single_bodies import Triple, inner, times
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel
 
+_KEPT = 8  # configurations whose candidates are kept: other loads and other forces start at the same one
 _TURNS = tuple(np.eye(3, 6, 3).ravel().tolist())  # rows of the angular velocity
 
 
@@ -54,38 +54,34 @@ class Gaps(Candidates):
         self, cores: Cores, places: CorePlaces, found: Candidates, transforms: FloatArray, reach: float, own: bool
     ) -> None:
         """Take candidates, transforms of obstacles to the world, shape (n, 4, 4), reach [m]; may the robot touch itself?"""
-        super().__init__(*found.given)
-        self._cores, self.places, self._transforms, self.reach = cores, places, transforms, reach
+        super().__init__(found.parts, *found.given)
+        self._cores, self.places, self.reach = cores, places, reach
+        self.transforms, self.capsule_radii = transforms, cores.radii
+        """Transforms of the obstacles to the world, shape (n, 4, 4); and radii of all capsules, shape (k,) [m]."""
         self.with_itself = own
         """Whether the robot may touch itself."""
-        self.values: FloatArray
-        """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
+        self.keys = self.keys_of_all()
+        """Capsule, obstacle and feature of each candidate: what stays the same from one configuration to the next. Numbers of
+        obstacles beyond the last are capsules of the robot itself: the number less that of obstacles."""
+        _, points, distances, normals = found.given
         if self.few:
-            self.values = np.array([one - cores.plain[key[0]][2] for key, one in zip(self.keys, found.given[3], strict=True)])
-        else:
-            self.values = self.distances - self.radii
-
-    @cached_property
-    def moves(self) -> FloatArray:
-        """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
-
-        Where the robot touches itself, less that of the other capsule.
-        """
-        moves = self._cores.moves.take([key[0] for key in self.keys] if self.few else self.capsules, 0)
-        if self.with_itself:
-            rows = (self.obstacles >= len(self._transforms)).nonzero()[0]
-            moves[rows] -= self._cores.moves[self.obstacles[rows] - len(self._transforms)]
-        return moves
-
-    @cached_property
-    def jacobian(self) -> FloatArray:
-        """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
-        if self.few:
-            points, normals = self.given[2], self.given[4]
+            capsules, radii = [key[0] for key in self.keys], cores.plain_radii
+            values = np.array([one - radii[capsule] for one, capsule in zip(distances, capsules, strict=True)])
             wrenches = np.array([(*n, *times(p, n)) for p, n in zip(points, normals, strict=True)]).reshape(-1, 6)
         else:
-            wrenches = np.concatenate([self.normals, cross(self.core_points, self.normals)], axis=1)
-        return np.asarray(wrenches.dot(self.places.jacobian) * self.moves)
+            capsules, values = self.capsules, distances - self.radii
+            wrenches = np.concatenate([normals, cross(points, normals)], axis=1)
+        self.values: FloatArray = values
+        """Signed gaps, shape (m,) [m]; negative where the surfaces penetrate."""
+        self.moves: FloatArray = cores.moves.take(capsules, 0)
+        """1 where a joint coordinate moves the capsule of a candidate, else 0, shape (m, nv).
+
+        Where the robot touches itself, less that of the other capsule."""
+        if own:
+            rows = (self.obstacles >= len(transforms)).nonzero()[0]
+            self.moves[rows] -= cores.moves[self.obstacles[rows] - len(transforms)]
+        self.jacobian: FloatArray = wrenches.dot(places.jacobian) * self.moves
+        """Derivatives of the gaps by the joint coordinates, `n^T J` at the points of the cores, shape (m, nv)."""
 
     def __len__(self) -> int:
         """Number of candidates."""
@@ -95,16 +91,6 @@ class Gaps(Candidates):
     def radii(self) -> FloatArray:
         """Radii of the capsules, shape (m,) [m]."""
         return np.asarray(self._cores.radii.take(self.capsules))
-
-    @property
-    def transforms(self) -> FloatArray:
-        """Transforms of the obstacles to the world, shape (n, 4, 4)."""
-        return self._transforms
-
-    @property
-    def capsule_radii(self) -> FloatArray:
-        """Radii of all capsules, shape (k,) [m]."""
-        return self._cores.radii
 
     @property
     def points(self) -> FloatArray:
@@ -144,15 +130,15 @@ class Gaps(Candidates):
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
         if not len(rows):
             return self._cores.no_load
-        count, values, surface = len(self._transforms), forces.tolist(), None if normal else self.points.tolist()
+        count, values, surface = len(self.transforms), forces.tolist(), None if normal else self.points.tolist()
         loads: list[Any] = []
         angular: list[float] = []  # rows of six, joined
         by_force: list[float] = []
         owners: list[int] = []
         own: list[int] = []
         for row in rows.tolist():
-            capsule, other, _ = self.keys[row]
-            point, _, (a, b, c) = self.row(row)
+            (capsule, other, _), at = self.keys[row], self.row(row)
+            point, _, (a, b, c) = at
             if surface is None:
                 force = values[row] * a, values[row] * b, values[row] * c
             else:
@@ -164,7 +150,7 @@ class Gaps(Candidates):
                 loads.append((other - count, [-one for one in force], point.tolist()))
                 own.append(row)
             elif normal:
-                for wrench, weight in self._curved(row, values[row]):
+                for wrench, weight in self._curved(row, values[row], at):
                     by_force += wrench
                     angular += [weight * one for one in wrench]
                     owners.append(capsule)
@@ -189,26 +175,19 @@ class Gaps(Candidates):
             factors = np.concatenate([factors, self._curved_by_itself(own, forces)], axis=1)
         return JointLoad(torque, factors[0], factors[1], None, None, potential, self.reach * size)
 
-    def bends(self, row: int) -> Bends:
-        """Second derivative of the distance of a candidate from its obstacle."""
-        place, parts = row, iter(self.parts)
-        field, which = next(parts)
-        while place >= len(which):
-            place -= len(which)
-            field, which = next(parts)
-        point, distance, normal = self.row(row)
-        return field.bends(int(which[place]), point, distance, normal)
-
-    def _curved(self, row: int, force: float) -> list[tuple[Any, float]]:
+    def _curved(self, row: int, force: float, at: tuple[Triple, float, Triple]) -> list[tuple[Any, float]]:
         r"""What the derivative of a normal force [N] of an obstacle has beside that of a dead one.
 
         Returns:
             Wrenches, force first, and weights `w` [N/m]: it is :math:`\sum w\,a^T a` with the torques `a` of the wrenches.
         """
-        (point, _, normal), bends = self.row(row), self.bends(row)
+        bends = self.bends(row, at)
+        if not bends:
+            return []
+        point, _, normal = at
         found: list[tuple[Any, float]] = [((*way, *times(point, way)), force * weight) for way, weight in bends]
         capsule, _, feature = self.keys[row]
-        if bends and feature == INSIDE:
+        if feature == INSIDE:
             span = self.places.span(capsule)
             shares = [weight * inner(way, span) for way, weight in bends]
             x, y, z = (sum(share * way[k] for share, (way, _) in zip(shares, bends, strict=True)) for k in range(3))  # H t
@@ -224,7 +203,7 @@ class Gaps(Candidates):
         weights: list[float] = []
         for row in rows:
             capsule, other, feature = self.keys[row]
-            pair = capsule, other - len(self._transforms)
+            pair = capsule, other - len(self.transforms)
             distance = float(self.distances[row] + self._cores.radii[pair[1]])
             point, normal = self.core_points[row], self.normals[row]
             new, each = relative_curvature(self._cores, self.places, pair, point, normal, distance, feature == INSIDE)
@@ -265,7 +244,7 @@ class Gaps(Candidates):
     def _frames(self, obstacles: Any) -> FloatArray:
         """Transforms of obstacles to the world; of capsules of the robot, their joints'."""
         joints = self.places.placements[self._cores.carrier]
-        return np.asarray(np.concatenate([self._transforms, joints])[obstacles])
+        return np.asarray(np.concatenate([self.transforms, joints])[obstacles])
 
 
 class Surroundings:
@@ -282,7 +261,7 @@ class Surroundings:
         self._cores, self._itself = cores_of(model), environment.self_contact
         self._pairs = self_contact_pairs(model, self._cores) if environment.self_contact else None
         self._fields, self._transforms = obstacle_fields(environment), obstacle_transforms(environment)
-        self._reach = model.reach
+        self._reach, self._last = model.reach, dict[Any, Gaps]()
         self._links = tuple(one.link for one in self._cores.capsules)
         self._names = (*environment.names, *self._links)  # of obstacles, and of capsules, which the robot itself may touch
 
@@ -305,6 +284,13 @@ class Surroundings:
         Returns:
             The candidates with their derivatives.
         """
-        places = self._cores.at(q)
-        found = find_candidates(self._cores, places, self._fields, self._pairs, margin, SAME_POINT * self._reach)
-        return Gaps(self._cores, places, found, self._transforms, self._reach, self._itself)
+        key = q.tobytes(), margin
+        gaps = self._last.pop(key, None)
+        if gaps is None:
+            places = self._cores.at(q)
+            found = find_candidates(self._cores, places, self._fields, self._pairs, margin, SAME_POINT * self._reach)
+            gaps = Gaps(self._cores, places, found, self._transforms, self._reach, self._itself)
+            if len(self._last) == _KEPT:
+                del self._last[next(iter(self._last))]
+        self._last[key] = gaps
+        return gaps

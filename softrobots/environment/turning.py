@@ -30,7 +30,7 @@ def turning(gaps: Gaps, rows: Any) -> tuple[FloatArray, FloatArray]:
         Both of shape (k, 3, nv); those of the points count how they move over the surface, too.
     """
     core, spans = gaps.point_jacobian(rows, gaps.core_points[rows]), gaps.places.spans[gaps.capsules[rows]]
-    flat, bends = np.zeros((3, 3)), [gaps.bends(row) for row in rows.tolist()]
+    flat, bends = np.zeros((3, 3)), [gaps.bends(row, gaps.row(row)) for row in rows.tolist()]
     hessian = np.array([sum((weight * np.outer(a, a) for a, weight in one), flat) for one in bends]).reshape(-1, 3, 3)
     pulls = (hessian @ spans[:, :, None])[:, :, 0]
     bend = (pulls * spans).sum(axis=1)

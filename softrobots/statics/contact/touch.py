@@ -127,15 +127,9 @@ def joined(applied: JointLoad, contact: JointLoad) -> JointLoad:
     moments = applied.by_moment
     if moments is not None:
         moments = np.concatenate([moments, np.zeros_like(contact.angular)])
-    return JointLoad(
-        torque=applied.torque + contact.torque,
-        angular=np.concatenate([applied.angular, contact.angular]),
-        by_force=np.concatenate([applied.by_force, contact.by_force]),
-        by_moment=moments,
-        gravity_derivative=applied.gravity_derivative,
-        potential=applied.potential,
-        scale=applied.scale + contact.scale,
-    )
+    torque, angular, by_force, _, gravity_derivative, potential, scale = applied
+    angular, by_force = np.concatenate([angular, contact.angular]), np.concatenate([by_force, contact.by_force])
+    return JointLoad(torque + contact.torque, angular, by_force, moments, gravity_derivative, potential, scale + contact.scale)
 
 
 def resting_forces(touch: Touch, out_of_balance: FloatArray, reach: float) -> FloatArray:
