@@ -143,6 +143,20 @@ def test_a_tip_stops_before_a_plate_in_any_number_of_rows(thick: float, rows: in
     assert -1e-9 <= left <= 2.0**-14 / (rows - 1) + 1e-9
 
 
+@pytest.mark.parametrize("rows", [2, 3])
+def test_without_friction_no_tip_passes_through_a_plate_between_waypoints(rows: int) -> None:
+    """The same ball; it goes on behind the plate where a jump is allowed, and over a plate that leaves room for its radius."""
+    way = np.linspace(0.0, 1.0, rows + rows % 2)  # no waypoint in the plate
+    targets = np.column_stack([way, np.zeros(len(way)), np.full(len(way), 0.1)])
+    plate, low = (sr.Environment([sr.Box((0.02, 1.0, 1.0), (0.5, 0.0, z), name="plate")]) for z in (0.5, -0.501))
+    with pytest.raises(sr.TargetUnreachable, match="no continuous motion"):
+        sr.follow_trajectory(block(), targets, environment=plate)
+    free = sr.follow_trajectory(block(), targets)
+    for environment, jumps in ((plate, True), (low, False)):
+        found = sr.follow_trajectory(block(), targets, environment=environment, allow_jumps=jumps)
+        assert found.q_motors == pytest.approx(free.q_motors, abs=1e-9)
+
+
 def test_what_friction_cannot_have_is_refused(arm: sr.SoftModel) -> None:
     for options in ({}, {"environment": WALL, "allow_jumps": True}):
         with pytest.raises(sr.ParameterError, match="friction"):
