@@ -470,6 +470,14 @@ def test_a_grown_tube_stands_on_the_same_helix(form: str, length: float) -> None
     assert mass == pytest.approx(920 * math.pi * 0.0331 * 1e-4 * length, rel=1e-13)
 
 
+def test_a_tube_that_grows_has_the_text_that_xacro_writes() -> None:
+    """Digit for digit, at lengths of as many hinges and of fewer."""
+    robot = HelixTube(chain="lumped", hinges=8)
+    for length in (1.45, 1.46, 1.47, 1.5, 1.4, 1.2, 0.2, 0.21, 1.475):
+        grown = robot.grown(length)
+        assert grown.urdf() == expand(xacro_folder() / grown.XACRO, grown.xacro_arguments())
+
+
 def test_sections_of_a_grown_tube_are_not_longer_than_before() -> None:
     """So the chain that carried the tube carries it at every length; and there is no section more than that takes."""
     for count in (6, 7, 11, 24):  # six are the fewest for this tube

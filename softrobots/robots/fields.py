@@ -6,6 +6,7 @@ them, and a test compares the xacro files with them.
 
 from __future__ import annotations
 
+import contextlib
 import dataclasses
 import inspect
 from collections.abc import Sequence
@@ -16,14 +17,17 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from softrobots.core.errors import FieldNotFound, ParameterError
+from softrobots.core.errors import DescriptionError, FieldNotFound, ParameterError
 from softrobots.core.summary import Part, Summarised, facts, field_facts
 from softrobots.description.expansion import expand
+from softrobots.description.number_tape import Tape
 from softrobots.description.paths import xacro_folder
 from softrobots.robots.field_values import checked_value, numbers, within
 
 MOST_PARTS = 1000
 """Largest number of links or segments; xacro takes minutes for that many."""
+
+_MOST_TAPES = 16  # of a robot that grows; they differ in how comparisons came out
 
 _ELSEWHERE = {
     "payload": ["a load on the tip of any robot: force= or wrench= of the solvers, or a body by softrobots.mount(robot, body)"]
@@ -177,6 +181,7 @@ class XacroRobot(Summarised):
     XACRO: ClassVar[str | Path]
     """The file that describes the robot: a name in xacro/, or a path."""
     _text: ClassVar[str | None] = None  # its URDF text, where a robot was made together with it
+    _grows: ClassVar[bool] = False  # whether others are to come that differ in their length only
     __signature__ = _FieldsAsArguments()
 
     def __new__(cls: type[RobotClass], *_: Any, **values: Any) -> RobotClass:
@@ -214,7 +219,9 @@ class XacroRobot(Summarised):
         Raises:
             DescriptionError: If xacro refuses the parameters, e.g. parts too light to cut tiny links from them.
         """
-        return _expanded(self.XACRO, tuple(self.xacro_arguments().items())) if self._text is None else self._text
+        if self._text is not None:
+            return self._text
+        return _expanded(self.XACRO, tuple(self.xacro_arguments().items()), self._grows)
 
     def _each(self, name: str) -> tuple[Any, ...]:
         """Values of a field, one a part."""
@@ -223,8 +230,23 @@ class XacroRobot(Summarised):
 
 
 @lru_cache(maxsize=64)
-def _expanded(xacro_file: str | Path, arguments: tuple[tuple[str, str], ...]) -> str:
-    return expand(xacro_folder() / xacro_file, dict(arguments))
+def _expanded(xacro_file: str | Path, arguments: tuple[tuple[str, str], ...], grows: bool) -> str:
+    """URDF text; of a robot that grows by the tape of an expansion that only its argument `length` distinguishes from this."""
+    path, given = xacro_folder() / xacro_file, dict(arguments)
+    if grows:
+        number, tapes = [float(given["length"])], _tapes(xacro_file, tuple(one for one in arguments if one[0] != "length"))
+        if (texts := next(filter(None, (tape.texts(number) for tape in tapes)), None)) is None and len(tapes) < _MOST_TAPES:
+            tapes.append(tape := Tape(number))
+            with contextlib.suppress(DescriptionError, ArithmeticError, ValueError, TypeError, AttributeError):  # expanded anew
+                texts = tape.texts(number) if tape.keep(expand(path, given | {"length": str(tape.numbers[0])}, tape)) else None
+        if texts is not None:
+            return texts[0]
+    return expand(path, given)
+
+
+@lru_cache(maxsize=16)
+def _tapes(xacro_file: str | Path, others: tuple[tuple[str, str], ...]) -> list[Tape]:
+    return []
 
 
 def default_text(field: Field[Any]) -> str:

@@ -283,8 +283,9 @@ class HelixTube(XacroRobot):
         used = "elastic_sections" if self.chain == "sections" else "hinges"
         if each[used] > MOST_SECTIONS:
             raise ParameterError("length", length, f"so short that {MOST_SECTIONS} sections are enough, not {each[used]}")
-        each = {name: min(count, MOST_SECTIONS) for name, count in each.items()}
-        return dataclasses.replace(self, length=length, **each)
+        grown = dataclasses.replace(self, length=length, **{name: min(count, MOST_SECTIONS) for name, count in each.items()})
+        object.__setattr__(grown, "_grows", True)
+        return grown
 
     def _chain_along_actuator(self, contraction: float) -> tuple[FloatArray, float]:
         """Strains and rest length of the chain of a real actuator at a contraction."""
