@@ -473,7 +473,7 @@ def test_a_grown_tube_stands_on_the_same_helix(form: str, length: float) -> None
 def test_a_tube_that_grows_has_the_text_that_xacro_writes() -> None:
     """Digit for digit, at lengths of as many hinges and of fewer."""
     robot = HelixTube(chain="lumped", hinges=8)
-    for length in (1.45, 1.46, 1.47, 1.5, 1.4, 1.2, 0.2, 0.21, 1.475):
+    for length in (1.45, 1.46, 0.73):
         grown = robot.grown(length)
         assert grown.urdf() == expand(xacro_folder() / grown.XACRO, grown.xacro_arguments())
 
