@@ -22,10 +22,6 @@ INSIDE = 2
 """Feature of the minimum between the ends of a core; 0 and 1 are start and end, larger numbers crossed borders."""
 
 
-Columns = tuple[Any, Any, Any, FloatArray, FloatArray, FloatArray]
-"""Capsule, obstacle, feature, point, distance and normal of candidates as arrays, see `Candidates`."""
-
-
 class Candidates:
     """Candidates, sorted by field; few are in plain numbers, many in arrays, and each is read in both ways."""
 
@@ -234,8 +230,8 @@ def _few(field: Field, numbers: Any, cores: Cores, ends: Any, margin: float, mer
     return Candidates([(field, bodies)], keys, points, found, normals)
 
 
-def _near(field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, limits: FloatArray, merged: float) -> Columns:
-    """Candidates of pairs of core and body: ends where `counted`, shape (m, 2), truth values, and what is between them."""
+def _near(field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, limits: FloatArray, merged: float) -> Any:
+    """Columns of candidates of cores and bodies: ends where `counted`, shape (m, 2), truth values, and what is between them."""
     most, ends = limits.take(one), places.ends.take(one, 0)
     values, normals = field.at(ends.reshape(-1, 3), other.repeat(2))
     known = values.reshape(-1, 2), normals.reshape(-1, 2, 3)
@@ -248,8 +244,7 @@ def _near(field: Field, places: CorePlaces, one: Any, other: Any, counted: Any, 
         return at_ends
     which = other.take(inner.pairs)
     new = (one.take(inner.pairs), which, INSIDE + inner.features, inner.points, inner.distances, inner.normals)
-    both: Any = tuple(np.concatenate(pair) for pair in zip(at_ends, new, strict=True)) if len(chosen) else new
-    return both  # type: ignore[no-any-return]
+    return tuple(np.concatenate(pair) for pair in zip(at_ends, new, strict=True)) if len(chosen) else new
 
 
 def _own(cores: Cores, places: CorePlaces, pairs: Any, margin: float, merged: float, count: int) -> Candidates:

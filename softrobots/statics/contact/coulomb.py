@@ -40,6 +40,7 @@ CONE = 1e-10
 _MOTIONLESS = 1e-6  # motion of a point that no spring can move, over the reach and a radian
 _OPENING = 100.0  # weight of a gap against a force, over the stiffness of the springs, where contacts are taken as open
 _FULL_STEPS = 12  # Newton steps before they are halved
+_NO_NEARER = 1e-3  # change of the norm of all equations, relative to it, with which steps go nowhere
 _HALVINGS = 5  # of a Newton step
 _STILL = 1e-10  # [rad], Newton step after which no motion of the springs brings the equations any nearer
 
@@ -85,6 +86,8 @@ def solve_step(
                 if there is not None and there.laws.merit < (1.0 - 0.1 * share) * here.laws.merit:
                     break
                 share *= 0.5
+            if there is not None and abs(there.laws.merit - here.laws.merit) <= _NO_NEARER * here.laws.merit:
+                there = there if _converged(step, there, forced) else None
             here = there
     return None, spent
 
