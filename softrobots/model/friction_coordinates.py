@@ -184,25 +184,44 @@ def with_given_friction(model: SoftModel, law: FrictionLaw) -> SoftModel:
     return replace(model, coordinates=_around(model.coordinates, GivenFriction(inner, law)))
 
 
-def gripped(model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: FloatArray) -> tuple[SoftModel, float]:
-    """Return the robot with the friction of its guides at given coordinates and loads, and how much that changed.
+class GuideFriction:
+    """Friction of guides on its way to that which stays: rounds of given friction, with a secant through the last two.
 
-    The change is relative to the largest load; infinite where the friction runs away: that of given lengths answers to itself.
-
-    Args:
-        model: The robot, with friction of guides.
-        motors: Actuators, shape (n_motors,).
-        elastic: Elastic coordinates, shape (n_springs,).
-        loads: Load on each actuator; of muscles the tension at the motor, shape (n_motors,) [N m or N].
+    Rounds alone go to and fro between two states where friction is strong; of the last two changes the combination of least
+    squares vanishes at once along their line ([Anderson 1965] with a memory of one).
     """
-    last, tensions = _rubbing(model.coordinates), loads[len(model.structure.motor_joints) :]
-    with np.errstate(over="ignore", invalid="ignore"):
-        grip = last.friction.grip(model.structure.strains(motors, elastic), tensions, last.memory)
-        change = float(np.abs(grip - last.grip).max(initial=0.0))
-    largest = float(np.abs(loads).max(initial=0.0))
-    if not change <= RUNAWAY * largest:
-        return model, math.inf
-    return _rubbed(model, last.memory, grip), change / max(largest, 1e-300)
+
+    def __init__(self) -> None:
+        """Begin."""
+        self._last: tuple[FloatArray, FloatArray] | None = None
+
+    def after(self, model: SoftModel, motors: FloatArray, elastic: FloatArray, loads: FloatArray) -> tuple[SoftModel, float]:
+        """Return the robot with the friction of its guides for the next round, and how far that of this round is off.
+
+        The difference is relative to the largest load; infinite where friction runs away: that of given lengths answers to
+        itself.
+
+        Args:
+            model: The robot, with friction of guides.
+            motors: Actuators, shape (n_motors,).
+            elastic: Elastic coordinates, shape (n_springs,).
+            loads: Load on each actuator; of muscles the tension at the motor, shape (n_motors,) [N m or N].
+        """
+        last, tensions = _rubbing(model.coordinates), loads[len(model.structure.motor_joints) :]
+        with np.errstate(over="ignore", invalid="ignore"):
+            grip = last.friction.grip(model.structure.strains(motors, elastic), tensions, last.memory)
+            change = grip - last.grip
+            off = float(np.abs(change).max(initial=0.0))
+        largest = float(np.abs(loads).max(initial=0.0))
+        if not off <= RUNAWAY * largest:
+            return model, math.inf
+        aim = grip
+        if self._last is not None:
+            bent = change - self._last[1]
+            share = float(bent @ change) / max(float(bent @ bent), 1e-300)
+            aim = np.maximum(grip - share * (grip - self._last[0]), 0.0)
+        self._last = grip, change
+        return _rubbed(model, last.memory, aim), off / max(largest, 1e-300)
 
 
 def packed_memories(models: Sequence[SoftModel]) -> dict[str, list[FloatArray]]:

@@ -17,7 +17,7 @@ from eigenpy import ComputationInfo
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.model.coordinates import Point, ReducedLoad
-from softrobots.model.friction_coordinates import MOST_ROUNDS, SAME_FRICTION, gripped
+from softrobots.model.friction_coordinates import MOST_ROUNDS, SAME_FRICTION, GuideFriction
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.touch import NEAR, NO_FORCES, ForceTable, NearSurfaces, Touch, joined, resting_forces
 from softrobots.statics.loads import AppliedLoad, Load
@@ -125,12 +125,13 @@ def rubbing_state(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray,
     """Evaluate the same, and return the robot with the friction that its guides have there; the robot itself without guides."""
     with one_blas_thread(model.n_springs):
         state = _evaluated(model, q_motors, q_springs, load)
-        change, rounds = math.inf if model.structure.guided else 0.0, 0
-        while change > SAME_FRICTION and rounds < MOST_ROUNDS:
-            model, change = gripped(model, q_motors, q_springs, state.load.motors)
-            if change > SAME_FRICTION:
-                state, rounds = _evaluated(model, q_motors, q_springs, load), rounds + 1
-        return model, state if change <= SAME_FRICTION else state._replace(error=math.inf)
+        rounds, off = GuideFriction(), math.inf if model.structure.guided else 0.0
+        for _ in range(MOST_ROUNDS if model.structure.guided else 0):
+            model, off = rounds.after(model, q_motors, q_springs, state.load.motors)
+            if off <= SAME_FRICTION:
+                break
+            state = _evaluated(model, q_motors, q_springs, load)
+        return model, state if off <= SAME_FRICTION else state._replace(error=math.inf)
 
 
 def _evaluated(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, load: Load) -> ElasticState:

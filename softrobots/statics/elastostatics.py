@@ -19,7 +19,7 @@ from eigenpy import LDLT
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
-from softrobots.model.friction_coordinates import SAME_FRICTION, gripped
+from softrobots.model.friction_coordinates import SAME_FRICTION, GuideFriction
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.solver import settle
@@ -51,6 +51,8 @@ ARMIJO = 1e-4
 CLEARLY = 1e3
 """Times `POSITIVE`: the sign of an eigenvalue beyond does not depend on the residual that is left."""
 
+_GUIDED = 10  # times the evaluations, of robots whose actuators rub in their guides
+_FINER = 1e-2  # of the tolerance, in each round of these: what is left moves the friction of the next
 _SHORTEST = 1e-12  # share of a Newton step below which it is not halved again
 
 
@@ -73,7 +75,8 @@ def solve_springs(
     Raises:
         ParameterError: If the load has an environment and a moment, or the method is not "newton" there.
     """
-    most = MOST_ITERATIONS[method] if max_iterations is None else max_iterations
+    usual = MOST_ITERATIONS[method] * (_GUIDED if model.structure.guided else 1)
+    most = usual if max_iterations is None else max_iterations
     solve = _fixed_point if method == "fixed_point" else _descend if load.conservative else _grow_load
     if load.environment is not None:
         if method != "newton":
@@ -83,13 +86,15 @@ def solve_springs(
                 "wrench", load.wrenches, "forces only in contact: follow_contact takes moments, which have no energy"
             )
         solve = settle
+    tolerance = tolerance * (_FINER if model.structure.guided else 1.0)
     with one_blas_thread(model.n_springs):
         state, spent, stable = solve(ElasticProblem(model, q_motors, load, tolerance), start, most)
+        rounds = GuideFriction()
         while model.structure.guided:  # the friction of guides follows the tensions
-            model, change = gripped(model, q_motors, state.q_springs, state.load.motors)
-            if change <= SAME_FRICTION:
+            model, off = rounds.after(model, q_motors, state.q_springs, state.load.motors)
+            if off <= SAME_FRICTION:
                 break
-            if spent >= most or math.isinf(change):
+            if spent >= most or math.isinf(off):
                 return state._replace(error=math.inf), spent, False
             state, used, stable = solve(ElasticProblem(model, q_motors, load, tolerance), state.q_springs, most - spent)
             spent += used

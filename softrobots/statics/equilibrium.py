@@ -56,7 +56,8 @@ def solve_equilibrium(
         q_springs0: Start of the solver, shape (n_springs,) [rad or m]; the relaxed springs by default.
         previous: Where the robot comes from: what dry friction remembers, and the start unless `q_springs0` is given.
         tolerance: Largest residual, relative to `max(|f| reach + |moment| + |g|, 1e-3 N m)`.
-        max_iterations: Limit of evaluations; 200 for "newton", 1000 for "fixed_point" by default.
+        max_iterations: Limit of evaluations; 200 for "newton", 1000 for "fixed_point" by default, ten times that where
+            actuators rub in their guides.
         environment: Obstacles that the robot touches without friction; only with "newton", and without moments.
 
     Returns:
@@ -122,6 +123,8 @@ def advice(best: Equilibrium, state: ElasticState) -> str:
     if best.environment is not None:
         names = ", ".join(map(repr, best.environment.names))
         return f"; among {names} no step lowers the energy; follow_contact goes by small steps from an equilibrium"
+    if best.model.structure.guided:
+        return "; the friction in the guides does not settle with the tensions: smaller steps from `previous` may get there"
     return (
         "" if best.conservative else "; under a world-fixed moment the load grows, then the moments alone, to a turning point"
     )

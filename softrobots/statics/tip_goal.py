@@ -21,7 +21,7 @@ from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import inverse_in_contact, tip_motion
 from softrobots.statics.tip_search import LEVER, LocalSolution, search
-from softrobots.statics.tip_steps import Pull, TipModel, pull
+from softrobots.statics.tip_steps import Pull, TipModel, given_tensions, muscle_room, taken_up
 
 _MOST_OPENED = 4  # pressed contacts beyond which each opens alone, or all of them
 
@@ -210,30 +210,19 @@ class LoadedTip:
         """Return the tensions with their derivatives; None of muscles of given length that push."""
         if not self.model.actuators.least_tension:
             return None
-        count = len(self.model.muscles)
+        model, count = self.model, len(self.model.muscles)
         by_motors, by_elastic = motor_slopes(state, self.load)
         slope = (by_motors + by_elastic @ follow)[-count:]
-        given = [row for row, muscle in enumerate(self.model.muscles) if muscle.kind == "tension"]
-        slope[given, np.array(given, dtype=int) - count] = 1.0
-        return pull(self.model, state.load.motors[-count:], slope)
-
-
-def taken_up(model: SoftModel, q_motors: FloatArray, state: ElasticState) -> tuple[FloatArray, float]:
-    """Return actuators with the slack of tendons taken up, and the largest tension beyond its limits; 0 of muscles that push.
-
-    Args:
-        model: The robot.
-        q_motors: Its actuators, shape (n_motors,).
-        state: The robot in equilibrium there.
-    """
-    actuators, structure = model.actuators, model.structure
-    if not actuators.least_tension:
-        return q_motors, 0.0
-    elongations = structure.muscle_paths.at(structure.strains(q_motors, state.q_springs)).elongation
-    low, high = actuators.sought_tensions.T
-    tensions = state.load.motors[len(q_motors) - len(low) :]
-    excess = max(0.0, float(np.max([low - tensions, tensions - high])) / actuators.tension_scale)
-    return actuators.taken_up(q_motors, elongations), excess
+        rows, rests = given_tensions(model)
+        slope[rows, rows - count] = 1.0
+        elongations, stretch = np.zeros(count), slope[:0]
+        if len(rows):
+            paths = model.structure.muscle_paths.at(state.q_springs)
+            elongations, stretch = paths.elongation, (paths.arms @ follow)[rows] / rests
+        tensions, scale = state.load.motors[-count:], model.actuators.tension_scale
+        limited = np.concatenate([slope / scale, stretch])
+        beyond = (tensions - model.actuators.wanted_tensions) / scale
+        return Pull(beyond, slope / scale, muscle_room(model, tensions, elongations), limited)
 
 
 def checked_orientation(value: Any) -> FloatArray | None:

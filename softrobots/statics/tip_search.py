@@ -67,7 +67,7 @@ class LocalSolution(Generic[State]):
     angle: float = 0.0
     """Angle between the tip and its target orientation [rad]; 0 without one."""
     excess: float = 0.0
-    """Largest tension beyond its limits, relative to `Actuators.tension_scale` [-]; 0 where the search ignores tensions."""
+    """How far a muscle is beyond its limits, see `tip_steps.muscle_room` [-]; 0 where the search ignores them."""
     iterations: int = 0
     """Steps."""
     unsolved: int = 0
@@ -78,7 +78,7 @@ class LocalSolution(Generic[State]):
         return self.error <= tolerance and self.angle <= ANGLE_TOLERANCE and self.excess <= TENSION_TOLERANCE
 
     def miss(self, model: SoftModel) -> float:
-        """Return distance, angle and tension beyond its limits as one distance [m]."""
+        """Return distance, angle and what is beyond limits of muscles as one distance [m]."""
         return float(np.hypot(self.error, LEVER * model.reach * np.hypot(self.angle, self.excess)))
 
 
@@ -212,7 +212,7 @@ def search(
         if there is not None and (there.miss(model) < miss or there.miss(model) <= allowed):
             here, mu, last = there, ease * mu if mu > _LAST_DAMPING * model.reach else 0.0, (step, drift)
             refused, ease = 0, 0.1
-        elif drifted > float(np.linalg.norm(towards)):
+        elif pace > 1.0 or drifted > float(np.linalg.norm(towards)):  # limits are kept up to a pace of one
             pace *= 0.5
         elif refused + 1 < len(models):
             refused += 1

@@ -1,8 +1,8 @@
 r"""Steps of inverse kinematics towards the goal, and, of more actuators than conditions, beside it, within all limits.
 
-Beside it the actuators go home (`step_home`), or, where muscles cannot both pull and push, tension limits are constraints, and
-redundant muscles get the least tension (`step_within`). With the tensions `T` and their derivatives by the actuators, springs
-in equilibrium, a step is
+Beside it the actuators go home (`step_home`), or, where muscles cannot both pull and push, limits of tensions and of the
+lengths of given tensions are constraints, and redundant muscles get the least tension (`step_within`). With the tensions `T`,
+their derivatives by the actuators and springs in equilibrium, a step is
 
 1. towards the goal: the least squares of what is missing, damped, within all limits;
 2. beside it, without moving the tip: the least :math:`|T - T_0|^2` within all limits,
@@ -18,13 +18,16 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray
 from softrobots.model.soft_model import SoftModel
+from softrobots.statics.elastic_state import ElasticState
 
 _SHARES = (1.0, 0.5, 0.25, 0.1, 0.0)  # of a violated limit that a step may take back
 _LEAST_DAMPING = 1e-7  # of a step, relative to the largest slope
 _ROUNDING = 1e-12  # of limits, in units of scaled actuators
+_INSIDE = 1e-9  # of a limited length, relative to that at rest, so that the one found is within
 _IDLE = 20  # steps of a drift that do not lessen tensions, after which it ends
 _SAME_SIZE = 1e-6  # of the sum of squares of tensions, relative to it
 
@@ -49,28 +52,62 @@ class TipModel(NamedTuple):
 
 
 class Pull(NamedTuple):
-    """Tensions of a robot in equilibrium, relative to `Actuators.tension_scale`, and where they should be."""
+    """Muscles of a robot in equilibrium: tensions, relative to `Actuators.tension_scale`, and how far limits are."""
 
     beyond: FloatArray
     """Tension beyond the least that is wanted, shape (n_muscles,) [-]."""
     slope: FloatArray
     """Its derivative by the actuators at constant load, shape (n_muscles, n_motors)."""
     room: FloatArray
-    """Room to the least and to the largest tension, negative beyond them, shape (2, n_muscles) [-]."""
+    """Room to the limits, shape (2, m) [-]; see `muscle_room`."""
+    limited: FloatArray
+    """Derivative of what they limit by the actuators, shape (m, n_motors)."""
 
     @property
     def excess(self) -> float:
-        """Largest tension beyond its limits [-]; 0 within them."""
+        """Largest of them beyond its limits [-]; 0 within them."""
         return max(0.0, -float(self.room.min()))
 
 
-def pull(model: SoftModel, tensions: FloatArray, slope: FloatArray) -> Pull:
-    """Return tensions, shape (n_muscles,) [N], and their derivative, shape (n_muscles, n_motors), for a step."""
-    actuators = model.actuators
-    low, high = actuators.sought_tensions.T
-    scale = actuators.tension_scale
-    room = np.array([tensions - low, high - tensions]) / scale
-    return Pull((tensions - actuators.wanted_tensions) / scale, slope / scale, room)
+def given_tensions(model: SoftModel) -> tuple[NDArray[np.intp], FloatArray]:
+    """Return the muscles of given tension, whose lengths no input keeps within limits, and these at rest, shape (n, 1) [m]."""
+    rows = np.flatnonzero([muscle.kind == "tension" for muscle in model.muscles])
+    return rows, np.array([[muscle.rest_length] for muscle in model.muscles]).reshape(-1, 1)[rows]
+
+
+def muscle_room(model: SoftModel, tensions: FloatArray, elongations: FloatArray) -> FloatArray:
+    """Return the room to the limits of muscles, from the least to the value and on to the largest, negative beyond them.
+
+    Args:
+        model: The robot.
+        tensions: Their tensions, shape (n_muscles,) [N].
+        elongations: Their lengths beyond those at rest, shape (n_muscles,) [m].
+
+    Returns:
+        Of tensions, relative to `Actuators.tension_scale`, then of lengths of given tensions, to those at rest, shape (2, m).
+    """
+    (low, high), scale = model.actuators.sought_tensions.T, model.actuators.tension_scale
+    rows, rests = given_tensions(model)
+    least, longest = (model.actuators.muscle_lengths[rows] / rests - 1.0).T
+    stretch = elongations[rows] / rests[:, 0]
+    tension = np.array([tensions - low, high - tensions]) / scale
+    return np.concatenate([tension, np.array([stretch - least, longest - stretch]) - _INSIDE], axis=1)
+
+
+def taken_up(model: SoftModel, q_motors: FloatArray, state: ElasticState) -> tuple[FloatArray, float]:
+    """Return actuators with the slack of tendons taken up, and how far a muscle is beyond its limits; 0 of those that push.
+
+    Args:
+        model: The robot.
+        q_motors: Its actuators, shape (n_motors,).
+        state: The robot in equilibrium there.
+    """
+    actuators, structure = model.actuators, model.structure
+    if not actuators.least_tension:
+        return q_motors, 0.0
+    elongations = structure.muscle_paths.at(structure.strains(q_motors, state.q_springs)).elongation
+    room = muscle_room(model, state.load.motors[len(q_motors) - len(elongations) :], elongations)
+    return actuators.taken_up(q_motors, elongations), max(0.0, -float(room.min()))
 
 
 def step_within(
@@ -92,11 +129,11 @@ def step_within(
     """
     basis = model.actuators.basis
     count = basis.shape[1]
-    felt = pulled.slope @ basis
+    felt, within = pulled.slope @ basis, pulled.limited @ basis
     low, high = model.motor_limits.T
     units = basis / model.motor_scale[:, None]
     ranges, _ = model.actuators.active_limits(motors)
-    ends = np.concatenate([-felt, felt, -units, units, ranges @ basis])
+    ends = np.concatenate([-within, within, -units, units, ranges @ basis])
     room = np.concatenate(
         [*pulled.room, (motors - low) / model.motor_scale, (high - motors) / model.motor_scale, np.zeros(len(ranges))]
     )

@@ -113,7 +113,7 @@ class Layout:
     anchored: int = field(init=False)
     """The same after it [m]."""
     grips: int = field(init=False)
-    """Friction of each guide that slips [N]."""
+    """Friction of each guide that slips [N]; then that which the last round led to, and by how much it was off."""
     prepared: int = field(init=False)
     """Values that depend on motors, load and numbers of the robot only; as many places as the code needs."""
 
@@ -126,7 +126,7 @@ class Layout:
         )
         points = dict(next_point=point, previous=point, predicted=point, correction=point)
         searches = dict(tip=3, torques=motors, target=self.target_size, next_target=self.target_size)
-        guides = dict(anchors=self.guides, anchored=self.guides, grips=self.guides)
+        guides = dict(anchors=self.guides, anchored=self.guides, grips=3 * self.guides)
         rest = dict(singles=len(SINGLES), numbers=self.inputs, sliders=self.rubbing, slid=self.rubbing, **guides, prepared=0)
         assign_places(self, motors, force=3, gravity=3, **before_tip, **searches, **points, **rest)
 

@@ -50,10 +50,16 @@ def mean_decay(along: float) -> float:
     return mean
 
 
-def grip(w: Array) -> float:
-    """Write the friction of each guide that slips; return the largest change, relative to the largest tension."""
+def grip(w: Array, rounds: int) -> float:
+    """Write the friction of each guide for the next round; return how far that of this one is off.
+
+    The difference is relative to the largest tension. From the second round on it is the secant through the last two, see
+    `softrobots.model.friction_coordinates.GuideFriction`.
+    """
     change = 0.0
     largest = 1e-300
+    bent = 1e-300
+    back = 0.0
     for m in range(N_RUBBING):
         before = fabs(w[PULLED + m])
         if before > largest:
@@ -62,11 +68,23 @@ def grip(w: Array) -> float:
             exponent = GUIDE_COEFFICIENT[guide] * angle_at(w, guide)
             along = exponent * w[GUIDE_AT[guide] + 4]
             mean = mean_decay(along)
-            friction = before * exponent * mean
+            off = before * exponent * mean - w[GRIPS + guide]
             before *= 1.0 - along * mean
-            if not fabs(friction - w[GRIPS + guide]) <= change:
-                change = fabs(friction - w[GRIPS + guide])
-            w[GRIPS + guide] = friction
+            if not fabs(off) <= change:
+                change = fabs(off)
+            turned = off - w[GRIPS + 2 * N_GUIDES + guide]
+            bent += turned * turned
+            back += turned * off
+            w[GRIPS + 2 * N_GUIDES + guide] = off
+    share = 0.0
+    if rounds > 0:
+        share = back / bent
+    for guide in range(N_GUIDES):
+        friction = w[GRIPS + guide] + w[GRIPS + 2 * N_GUIDES + guide]
+        w[GRIPS + guide] = friction - share * (friction - w[GRIPS + N_GUIDES + guide])
+        if w[GRIPS + guide] < 0.0:
+            w[GRIPS + guide] = 0.0
+        w[GRIPS + N_GUIDES + guide] = friction
     return change / largest
 
 
@@ -76,13 +94,13 @@ def descend_rubbing(w: Array) -> int:
         w[GRIPS + guide] = 0.0
     status = UNSETTLED
     steps = 0.0
-    for _ in range(GUIDE_ROUNDS):
+    for rounds in range(GUIDE_ROUNDS):
         status = descend(w)
         steps += w[ITERATIONS]
         w[ITERATIONS] = steps
         if w[RANGE_MARGIN] < 0.0:
             return status
-        change = grip(w)
+        change = grip(w, rounds)
         if change <= SAME_GRIP:
             return status
         if not change <= GRIP_RUNAWAY:

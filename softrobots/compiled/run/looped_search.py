@@ -22,9 +22,9 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState, elastic_state
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_force.force_search import Directions, search_force, torque_tolerance
-from softrobots.statics.tip_goal import Goal, LoadedTip, taken_up
+from softrobots.statics.tip_goal import Goal, LoadedTip
 from softrobots.statics.tip_search import LocalSolution, advance, search
-from softrobots.statics.tip_steps import Pull, TipModel
+from softrobots.statics.tip_steps import Pull, TipModel, taken_up
 
 _ROUNDING = 1e-9  # by which a motor may be beyond its limits [rad, m or N]
 

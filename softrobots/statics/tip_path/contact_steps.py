@@ -161,23 +161,23 @@ class TargetWay:
         work = 0.0
         for _ in range(_MOST_TURNS):
             tip = RubbingTip(self.given(here.q_motors), here.sliding, goal)
-            local = tip.solve(here.q_motors, here.q_springs)
-            if local is not None and local.arrived(self._tolerance):
-                passed = may_have_passed(local.state.robot, here)
-                return None if passed else local.state._replace(work=work + local.state.work)
-            wanted = None if local is None else self._wanted(tip, local)
-            if local is None or wanted is None:
-                return None
-            turn, far = wanted
-            if far <= 1.0:
-                found = advance(tip, goal, goal, local, self._tolerance, 0)
-                if found is None:
+            found = tip.solve(here.q_motors, here.q_springs)
+            far = 0.0
+            if found is not None and not found.arrived(self._tolerance):
+                wanted = self._wanted(tip, found)
+                if wanted is None:
                     return None
-                found = self._least(tip, here.q_motors, found)
-                turn, far = found.q_motors - here.q_motors, self._far(found.state.q_springs - here.q_springs)
+                turn, far = wanted
                 if far <= 1.0:
-                    passed = may_have_passed(found.state.robot, here)
-                    return None if passed else found.state._replace(work=work + found.state.work)
+                    found = advance(tip, goal, goal, found, self._tolerance, 0)
+                    if found is not None:
+                        found = self._least(tip, here.q_motors, found)
+                        turn, far = found.q_motors - here.q_motors, self._far(found.state.q_springs - here.q_springs)
+            if found is None:
+                return None
+            if far <= 1.0:
+                passed = may_have_passed(found.state.robot, here)
+                return None if passed else found.state._replace(work=work + found.state.work)
             part = self._model.actuators.go(here.q_motors, min(0.5, 0.5 / far) * turn)
             turned = step(self.given(part), here)
             if turned is None or not np.any(part != here.q_motors):
