@@ -265,6 +265,12 @@ def test_a_force_comes_back_from_the_tensions_and_the_state_before(fields: dict[
         assert fast.equilibrium(motors, previous=found).friction_bending is not None
     without = fast.estimate_load(motors, touched.motor_torques)
     assert np.abs(without.force - force).max() > 1e-3
+    rows = fast.equilibria([motors, motors, np.full(6, np.nan)], [np.zeros(3), force, np.zeros(3)])
+    batch = fast.estimate_loads(motors, touched.motor_torques, previous=rows)
+    assert batch.status.tolist() == [Status.CERTIFIED, Status.CERTIFIED, Status.NOT_A_NUMBER]
+    alone = fast.estimate_load(motors, touched.motor_torques, previous=fast.equilibrium(motors, force))
+    assert batch.forces[:2] == pytest.approx(np.array([force, alone.force]), abs=1e-7)
+    assert fast.estimate_loads(motors, touched.motor_torques).forces[0] == pytest.approx(without.force, abs=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -307,10 +313,6 @@ def test_a_robot_without_friction_remembers_nothing() -> None:
     assert found.friction_bending is None
     with pytest.raises(sr.ParameterError, match="None for a robot without dry friction"):
         fast.equilibrium(fast.model.relaxed_motors, previous=found)
-    with pytest.raises(sr.ParameterError, match="without dry friction, for compiled batches of estimates"):
-        compiled(sr.TendonArm(segment_lengths=(LENGTH,), elastic_sections=1, bending_friction=MOMENT)).estimate_loads(
-            np.full(3, LENGTH), np.zeros(3)
-        )
 
 
 RUBBING = ({"bending_friction": MOMENT}, {"bending_friction": 0.0, "guide_friction": 0.2})

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.integrate import solve_ivp
 
 import softrobots as sr
 
@@ -104,6 +105,36 @@ def test_a_tendon_in_its_guides_follows_the_capstan(tension: float) -> None:
     assert errors[2] < 2e-3 * capstan(tension, coefficient, np.array(LENGTH))
     frictionless = tension * DISTANCE * LENGTH / EI
     assert capstan(tension, coefficient, np.array(LENGTH)) < 0.97 * frictionless
+
+
+@pytest.mark.study
+@pytest.mark.parametrize(("coefficient", "tensions"), [(0.4, (40.0, 20.0)), (1.0, (20.0, 10.0))])
+def test_antagonists_with_strong_friction_hold_each_other(coefficient: float, tensions: tuple[float, float]) -> None:
+    r"""Two tendons face each other; one slips towards its motor, the other away from it, and friction acts on both.
+
+    `EI theta' = d (T_1 exp(-mu theta) - T_2 exp(mu theta))`, integrated by SciPy. Rounds of given friction alone go to and fro
+    between two states here. Second order in the sections; compiled code finds the same.
+    """
+    errors = []
+    for sections in (8, 16):
+        model = sr.load_model(one_segment(sections, (0.0, np.pi), guide_friction=coefficient))
+        found = sr.solve_equilibrium(model, tensions)
+        assert found.stable
+        errors.append(float(bending(found).sum()) * LENGTH / sections - bent_by_antagonists(coefficient, *tensions))
+    compiled = sr.compile(model, backend="python").equilibrium(np.array(tensions))
+    assert compiled.tip_position == pytest.approx(found.tip_position, abs=1e-10)
+    assert abs(errors[1]) < 5e-4  # rad, of 0.8 and 0.3
+    assert errors[0] / errors[1] == pytest.approx(4.0, abs=0.8)
+
+
+def bent_by_antagonists(coefficient: float, first: float, second: float) -> float:
+    """Angle at the tip [rad]."""
+
+    def slope(_: float, angle: np.ndarray) -> np.ndarray:
+        pulls = first * np.exp(-coefficient * angle) - second * np.exp(coefficient * angle)
+        return np.asarray(DISTANCE / EI * pulls)
+
+    return float(solve_ivp(slope, (0.0, LENGTH), [0.0], rtol=1e-10, atol=1e-12).y[0, -1])
 
 
 def test_a_tendon_that_is_let_go_first_sticks_and_then_slips_back() -> None:

@@ -19,7 +19,7 @@ from eigenpy import LDLT
 from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
-from softrobots.model.friction_coordinates import SAME_FRICTION, GuideFriction
+from softrobots.model.friction_coordinates import MOST_ROUNDS, SAME_FRICTION, GuideFriction
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.solver import settle
@@ -89,12 +89,13 @@ def solve_springs(
     tolerance = tolerance * (_FINER if model.structure.guided else 1.0)
     with one_blas_thread(model.n_springs):
         state, spent, stable = solve(ElasticProblem(model, q_motors, load, tolerance), start, most)
-        rounds = GuideFriction()
+        rounds, left = GuideFriction(), MOST_ROUNDS
         while model.structure.guided:  # the friction of guides follows the tensions
             model, off = rounds.after(model, q_motors, state.q_springs, state.load.motors)
             if off <= SAME_FRICTION:
                 break
-            if spent >= most or math.isinf(off):
+            left -= 1
+            if spent >= most or left == 0 or math.isinf(off):
                 return state._replace(error=math.inf), spent, False
             state, used, stable = solve(ElasticProblem(model, q_motors, load, tolerance), state.q_springs, most - spent)
             spent += used

@@ -19,7 +19,6 @@ from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
 from softrobots.core.checks import choice, finite_array, positive_integer, positive_number
 from softrobots.core.errors import LoadNotFound, ParameterError, TargetUnreachable
-from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
 from softrobots.statics.load_estimation import check_feels
@@ -126,7 +125,9 @@ class CompiledModel(CompiledDynamics):
             )
         return estimate
 
-    def estimate_loads(self, q_motors: Any, motor_torques: Any, *, gravity: Any = None, threads: int = 1) -> LoadBatch:
+    def estimate_loads(
+        self, q_motors: Any, motor_torques: Any, *, gravity: Any = None, threads: int = 1, previous: Any = None
+    ) -> LoadBatch:
         """Find the forces of many cases from their motor torques.
 
         Args:
@@ -134,26 +135,31 @@ class CompiledModel(CompiledDynamics):
             motor_torques: Load on each motor, shape (n, n_motors) [N m or N].
             gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
             threads: Number of threads; more than one speeds up numba only.
+            previous: Where robots with dry friction come from, as in `equilibria`, which under the forces found tells where
+                they are then.
 
         Returns:
             One row a case.
 
         Raises:
-            ParameterError: If a shape differs, gravity is not finite, or the robot has no actuators, muscles of given
-                tension, or dry friction.
+            ParameterError: If a shape differs, gravity is not finite, or the robot has no actuators or muscles of given
+                tension.
         """
-        check_feels(check_frictionless(self._model, "compiled batches of estimates (estimate_load takes it)"))
-        run = self._run(gravity is not None)
+        check_feels(self._model)
+        run, before = self._run(gravity is not None), self._before(previous)
         named = self._model.actuators.in_order
-        motors, torques = batch_rows(
+        motors, torques, *_ = batch_rows(
             q_motors=(named(q_motors, "q_motors"), self._motors),
             motor_torques=(named(motor_torques, "motor_torques"), self._motors),
+            **({} if before is None else before.rows),
         )
         down = gravity_vector(gravity)
         bad = unusable(motors, torques) | self._actuation.unsuited(motors)
         motors, torques = without(motors, bad, self._model.relaxed_motors), without(torques, bad)
-        search = self._search(run)
+        search = self._search(run, before)
         statuses, unknowns, forces, residuals, unexplained, observed = search.estimate_batch(motors, torques, down, threads)
+        if before is not None:
+            statuses = np.where(before.lost, before.status, statuses).astype(np.uint8)
         fail(statuses, bad, [residuals, unexplained], [unknowns, forces, observed])
         return LoadBatch(self._actuation.elastic(unknowns), statuses, residuals, forces, unexplained, observed)
 

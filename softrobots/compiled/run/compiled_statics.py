@@ -200,9 +200,8 @@ class CompiledStatics(CompiledCode):
         """
         run = self._run(gravity is not None)
         rows = self._model.actuators.in_order(q_motors, "q_motors")
-        before, counted = self._before(previous), {}
-        if before is not None and len(before.springs) != 1:
-            counted = {"previous": (before.springs, self._model.n_springs)}
+        before = self._before(previous)
+        counted = {} if before is None else before.rows
         motors, loads, *_ = batch_rows(q_motors=(rows, self._model.n_motors), forces=(forces, 3), **counted)
         down = gravity_vector(gravity)
         bad = unusable(motors, loads) | self._actuation.unsuited(motors)

@@ -35,6 +35,15 @@ class StatesBefore(NamedTuple):
         """Mask of the rows that are no equilibria, shape (n,)."""
         return ~np.isin(self.status, (Status.CERTIFIED, Status.NEUTRAL))
 
+    @property
+    def rows(self) -> dict[str, tuple[FloatArray, int]]:
+        """What `batch_rows` counts: nothing of one state for all cases."""
+        return {"previous": (self.springs, self.springs.shape[1])} if len(self.springs) != 1 else {}
+
+    def row(self, number: int) -> StatesBefore:
+        """Return the state of a case; the only one of all cases."""
+        return StatesBefore(*(part[number : number + 1] if len(part) > 1 else part for part in self))
+
 
 def states_before(actuation: Actuation, previous: Any) -> StatesBefore:
     """Return the states of a result, of a sequence of single results, or for None of a robot that nothing has moved yet.

@@ -45,7 +45,7 @@ class LoopedSearch:
 
     def __init__(self, model: SoftModel, actuation: Actuation, run: Any, before: StatesBefore | None = None) -> None:
         """Use the functions of a program with the response of the tip; `before`: where a robot with dry friction comes from."""
-        self.model, self.actuation, self.run = model, actuation, run
+        self.model, self.actuation, self.run, self._before = model, actuation, run, before
         self._start, self._given = model.rest, dict[str, Any]()
         if before is not None:
             self._start, self._given = before.springs[0], {"sliders": before.sliders[0], "anchors": before.anchors[0]}
@@ -172,7 +172,8 @@ class LoopedSearch:
         statuses, unknowns, forces = np.zeros(count, dtype=np.uint8), np.zeros((count, layout.unknowns)), np.zeros((count, 3))
         norms = np.zeros((3, count))
         for row in range(count):
-            statuses[row], w = self.estimate(motors[row], torques[row], gravity)
+            one = self if self._before is None else LoopedSearch(self.model, self.actuation, self.run, self._before.row(row))
+            statuses[row], w = one.estimate(motors[row], torques[row], gravity)
             unknowns[row], forces[row] = self.unknowns(w), self._part(w, layout.force, 3)
             norms[:, row] = [math.sqrt(w[layout.single(name)]) for name in ("error", "unexplained", "observed")]
         return statuses, unknowns, forces, norms[0], norms[1], norms[2]
