@@ -105,10 +105,10 @@ def solve_ik(
     Searches from `q_motors0` and from random coordinates within the limits (always the same ones), and returns, of the
     solutions found, the one that changes `q_motors0` least. Of a robot with more actuators than the target has conditions
     the change is minimal; if it has muscles, the first search that succeeds decides, as it does among obstacles. Where
-    muscles cannot both pull and push (a least tension of zero or more), the limits of all tensions are kept, too, and
-    redundant ones get the least tension instead: a minimum of the sum of squares beyond their pretension
-    (`statics.tip_steps`), also where lengths are given (`statics.tip_goal.LoadedTip.begin`). The lengths of given tensions
-    may be beyond their limits, which `Equilibrium.within_limits` tells.
+    muscles cannot both pull and push (a least tension of zero or more), the limits of all tensions and lengths are kept,
+    too, and redundant ones get the least tension instead: a minimum of the sum of squares beyond their pretension
+    (`statics.tip_steps`), also where lengths are given (`statics.tip_goal.LoadedTip.begin`). Lengths of given tensions that
+    pull and push may be beyond their limits, which `Equilibrium.within_limits` tells.
 
     For full poses of a robot with a spherical wrist the arm first puts the centre of the wrist in place, and the wrist starts
     in the orientation, with both of its solutions (`statics.spherical_wrist`).
