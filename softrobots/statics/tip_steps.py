@@ -1,8 +1,8 @@
 r"""Steps of inverse kinematics towards the goal, and, of more actuators than conditions, beside it, within all limits.
 
 Beside it the actuators go home (`step_home`), or, where muscles cannot both pull and push, limits of tensions and of the
-lengths of given tensions are constraints, and redundant muscles get the least tension (`step_within`). With the tensions `T`,
-their derivatives by the actuators and springs in equilibrium, a step is
+lengths of given tensions are constraints, and redundant muscles get the least tension (`step_within`). With the tensions `T`
+and their derivatives by the actuators, springs in equilibrium, a step is
 
 1. towards the goal: the least squares of what is missing, damped, within all limits;
 2. beside it, without moving the tip: the least :math:`|T - T_0|^2` within all limits,
