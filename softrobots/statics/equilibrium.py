@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
@@ -123,7 +124,7 @@ def advice(best: Equilibrium, state: ElasticState) -> str:
     if best.environment is not None:
         names = ", ".join(map(repr, best.environment.names))
         return f"; among {names} no step lowers the energy; follow_contact goes by small steps from an equilibrium"
-    if best.model.structure.guided:
+    if best.model.structure.guided and math.isinf(state.error):
         return "; the friction in the guides does not settle with the tensions: smaller steps from `previous` may get there"
     return (
         "" if best.conservative else "; under a world-fixed moment the load grows, then the moments alone, to a turning point"

@@ -212,7 +212,7 @@ def search(
         if there is not None and (there.miss(model) < miss or there.miss(model) <= allowed):
             here, mu, last = there, ease * mu if mu > _LAST_DAMPING * model.reach else 0.0, (step, drift)
             refused, ease = 0, 0.1
-        elif pace > 1.0 or drifted > float(np.linalg.norm(towards)):  # limits are kept up to a pace of one
+        elif drifted > (0.0 if pulled is not None and pace > 1.0 else float(np.linalg.norm(towards))):  # limits hold to 1
             pace *= 0.5
         elif refused + 1 < len(models):
             refused += 1
