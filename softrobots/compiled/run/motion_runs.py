@@ -23,7 +23,7 @@ from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import State, Step
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.recorder import Recorder
-from softrobots.dynamics.step_control import error_share, halved, rule_of_order
+from softrobots.dynamics.step_control import NoStep, error_share, follow, halved, rule_of_order
 from softrobots.dynamics.time_grid import SAME_TIME, grid_of_rows, merged_times
 
 _FIRST_STEPS = 400  # of the first of the runs that are compared
@@ -31,6 +31,7 @@ _STALLED = 4  # runs in which the error of the tip is to halve at least once
 _CHUNK = 2_000  # steps between two looks for Ctrl-C
 _CASE_STEPS = 10_000_000  # steps times cases between two looks for Ctrl-C, a second or so
 _SAMPLES = 2_000_000  # of motor positions in memory
+_WHOLE = 1e-9  # rad or m by which one midpoint step may seem to miss its end; one that was halved does so by h^2
 
 MOST_STEPS = 1_000_000
 """Most steps of one run that is refined for a tolerance."""
@@ -226,7 +227,7 @@ def replay(
 ) -> Motion:
     """Return the motion with torques and energies, by Pinocchio, from the states at the ends of all steps.
 
-    Steps of fourth order are taken again, each from where the compiled ones came to.
+    Steps of fourth order are taken again, each from where the compiled ones came to; so are those that had to be halved.
 
     Args:
         equations: Equations of motion.
@@ -237,7 +238,7 @@ def replay(
         order: Order of the steps.
 
     Raises:
-        NotConverged: If a step of fourth order is not found again.
+        NotConverged: If such a step is not found again.
     """
     m, k, count = equations.n_motors, equations.n - equations.n_motors, 2 * len(taken.grid) - 1
     motors, states = np.broadcast_to(motors_of_steps(course.path, taken.grid), (count, m)), taken.rows[0]
@@ -250,29 +251,37 @@ def replay(
     recorder = Recorder(rule_of_order(order)(equations, course.path, course.load), still(0.0, 0), rows)
     for step, end in enumerate(taken.grid[1:].tolist()):
         before = recorder.state
-        if order == GaussRule.order:
-            again = recorder.rule.step(before, end)
-            if again is None:
-                raise NotConverged(
-                    f"the step from {before.time:g} s to {end:g} s has no energies: Pinocchio did not find it again; required "
-                    "shorter steps, or order=2",
-                    best=None,
-                    residual=math.inf,
-                    iterations=step,
-                )
-            recorder.add(again._replace(end=still(end, step + 1)))
-            continue
         h, middle_time = end - before.time, 0.5 * (before.time + end)
         u0, middle, u1 = motors[2 * step : 2 * step + 3]
         y1, v1, v0 = states[step + 1, :k], states[step + 1, k : 2 * k], before.rates[m:]
         accelerations = np.concatenate([4.0 * (u1 - 2.0 * middle + u0) / h**2, (v1 - v0) / h])
         rates = np.concatenate([(u1 - u0) / h, 0.5 * (v0 + v1)])
         x, half = np.concatenate([middle, before.x[m:] + 0.5 * h * rates[m:]]), 0.5 * h * accelerations[:m]
-        begin = State(before.time, before.x, np.concatenate([rates[:m] - half, v0]))
-        last = State(end, np.concatenate([u1, y1]), np.concatenate([rates[:m] + half, v1]))
-        wrenches = course.load(middle_time)
-        forces = equations.balance(x, rates, accelerations, wrenches)[:m]
-        recorder.add(Step(begin, last, State(middle_time, x, rates), accelerations, forces, wrenches))
-        if end in course.path.kicks and end < recorder.duration:
+        last, again = State(end, np.concatenate([u1, y1]), np.concatenate([rates[:m] + half, v1])), None
+        if order == GaussRule.order:
+            again = recorder.rule.step(before, end)
+            again = again and again._replace(end=last)
+        elif np.allclose(before.x[m:] + h * rates[m:], y1, rtol=_WHOLE, atol=_WHOLE):
+            begin = State(before.time, before.x, np.concatenate([rates[:m] - half, v0]))
+            wrenches = course.load(middle_time)
+            forces = equations.balance(x, rates, accelerations, wrenches)[:m]
+            again = Step(begin, last, State(middle_time, x, rates), accelerations, forces, wrenches)
+        kicked = end in course.path.kicks and end < recorder.duration
+        if again is None:
+            _take_parts(recorder, end)
+            recorder.state = recorder.state if kicked else last
+            continue
+        recorder.add(again)
+        if kicked:
             recorder.kick(course.path.kicks[end])
     return recorder.motion(**facts)
+
+
+def _take_parts(recorder: Recorder, end: float) -> None:
+    """Take a step to a time [s] that does not succeed as a whole."""
+    try:
+        for _ in follow(recorder, np.array([recorder.state.time, end])):
+            pass
+    except NoStep as error:
+        why = f"the step to {end:g} s has no energies: Pinocchio did not find it again; required shorter steps: {error}"
+        raise NotConverged(why, best=None, residual=math.inf, iterations=len(recorder.times)) from error
