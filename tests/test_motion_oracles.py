@@ -230,7 +230,9 @@ def test_random_runs_end_with_numbers(engine: str, cases: int) -> None:
             except sr.NotConverged:
                 failed += 1
                 continue
-            assert all(np.all(np.isfinite(values)) for values in (moved.q_springs, moved.velocities, moved.tip_position, balance))
+            assert all(
+                np.all(np.isfinite(values)) for values in (moved.q_springs, moved.velocities, moved.tip_position, balance)
+            )
     assert failed < runs / 100, (failed, runs)
 
 
