@@ -22,5 +22,8 @@ RENEW_SHARE = 0.2
 LEAST_PART = 2.0**-12
 """Smallest part of a step of time."""
 
+COASTING_ERROR = 0.01
+"""Error of what the linear equations of the step before tell of a step, over how far that goes from the step before."""
+
 KEPT_DIFFERENCES = 8
 """Number of backward differences of the middles of equal steps from which the next middle is extrapolated."""

@@ -88,14 +88,15 @@ class Eliminated:
 
         `before`, shape (k,), is what the coupling by lengths adds to that by the turn.
         """
-        k = len(self.inverse_pivots)
-        steps = [
-            ((self.coupling[j] @ turn) + (0.0 if before is None else before[j]) - self.columns[column][j])
-            * self.inverse_pivots[j]  # backwards through L^T
-            for j in range(k)
-        ]
-        for j in reversed(range(k)):
-            for i in range(j + 1, k):
+        added = [0.0] * len(self.inverse_pivots) if before is None else before
+        rows = zip(self.coupling, added, self.columns[column], strict=True)
+        return self.solved([(row @ turn) + more - one for row, more, one in rows])
+
+    def solved(self, reduced: Sequence[Scalar]) -> Any:
+        """Return `D^-1 g'` from `L^-1 g'`, shape (k,): backwards through `L^T`."""
+        steps = [value * inverse for value, inverse in zip(reduced, self.inverse_pivots, strict=True)]
+        for j in reversed(range(len(steps))):
+            for i in range(j + 1, len(steps)):
                 steps[j] = steps[j] - self.lower[i, j] * steps[i]
         return vector(steps)
 

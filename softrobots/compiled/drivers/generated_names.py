@@ -78,6 +78,7 @@ UNKNOWN: int
 ACCELERATION: int
 BEGIN_POSITION: int
 BEGIN_VELOCITY: int
+COASTS: int
 CHANGE: int
 FAILED: int
 LAST_CHANGE: int
@@ -170,6 +171,8 @@ interpolate_unknown: Callable[[Array, int], None]
 interpolate_unknown_lanes: Callable[[Array, int], None]
 judge_corrections: Callable[[Array], None]
 judge_corrections_lanes: Callable[[Array], None]
+motion_coast: Callable[[Array], None]
+motion_coast_lanes: Callable[[Array], None]
 motion_correct: Callable[[Array], None]
 motion_correct_lanes: Callable[[Array], None]
 motion_factor: Callable[[Array], None]

@@ -15,12 +15,16 @@ def settle_middle(w: Array) -> bool:
     """Find the accelerations of a step; tell whether the corrections converge.
 
     The first correction takes the factors of the step before: those of the extrapolated point would have its forces, which are
-    wrong where stiff springs ring.
+    wrong where stiff springs ring. Those of a point that was coasted to are nearly right.
     """
     choose_order(w)
     for i in range(N):
         guess_unknown(w, i)
-    if w[N_HISTORY] < 0.5:
+    if w[COASTS] > 0.5:
+        motion_coast(w)
+        for i in range(N):
+            apply_correction(w, i)
+    if w[N_HISTORY] < 0.5 or w[COASTS] > 0.5:
         motion_factor(w)
     else:
         motion_correct(w)
@@ -36,7 +40,7 @@ def settle_middle(w: Array) -> bool:
             return False
         slow = w[CHANGE] > RENEW_SHARE * w[LAST_CHANGE]
         w[LAST_CHANGE] = w[CHANGE]
-        if step == 0 or slow:
+        if slow or (step == 0 and w[COASTS] < 0.5):
             motion_factor(w)
         else:
             motion_correct(w)

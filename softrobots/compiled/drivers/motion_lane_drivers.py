@@ -44,10 +44,20 @@ def settle_middle_lanes(w: Array, n_history: int) -> None:
     choose_order_lanes(w)
     for i in range(N):
         guess_unknown_lanes(w, i)
+    coasting = 0.0
+    for lane in range(LANES):
+        coasting += w[COASTS * LANES + lane]
+    if coasting > 0.5:
+        motion_coast_lanes(w)
+        for i in range(N):
+            apply_correction_lanes(w, i)
+    first = 1
+    if coasting > 0.5 or n_history == 0:
+        first = 0
     fill_lanes(w, LAST_CHANGE, 1e300)
     slow = 0.0
     for step in range(MOTION_CORRECTIONS):
-        if step == 1 or step + n_history == 0 or slow > 0.5:
+        if step == first or slow > 0.5:
             motion_factor_lanes(w)
         else:
             motion_correct_lanes(w)

@@ -77,7 +77,9 @@ class ArticulatedGroup:
     """Factors of a group of joints."""
 
     eliminated: Eliminated
-    """Elimination of its coordinates, with the accelerations at its base."""
+    """Elimination of its coordinates."""
+    gain: Any
+    """`G^-1 U^T`: what its coordinates yield to an acceleration of its base, shape (k, 6)."""
     motions: Any
     """Angular and linear velocity at its end per coordinate, shape (6, k)."""
     shift: Vector
@@ -149,12 +151,13 @@ def articulate(
             pushes = [moved_wrench(push, joint.shift) for push in pushes]
     if not len(own):
         rigid = Eliminated(constants(np.eye(0)), [], constants(np.zeros((0, 6))), [])
-        return ArticulatedGroup(rigid, constants(np.zeros((6, 0))), shift, reach), inertia, pull
+        return ArticulatedGroup(rigid, rigid.coupling, constants(np.zeros((6, 0))), shift, reach), inertia, pull
     block = slopes.T @ (products @ slopes) + own
     bends = -(np.stack(pushes, axis=1) @ slopes)
     none = constants(np.zeros(bends.shape))
     eliminated, rest = eliminate(Outboard(-inertia, [], 1.0, 0.0), none, bends, block, [], [1.0] * len(own))
-    return ArticulatedGroup(eliminated, np.stack(motions, axis=1) @ slopes, shift, reach), -rest.matrix, pull
+    gain = np.stack([eliminated.solved([*column]) for column in eliminated.coupling.T], axis=1)
+    return ArticulatedGroup(eliminated, gain, np.stack(motions, axis=1) @ slopes, shift, reach), -rest.matrix, pull
 
 
 def carried_inward(group: ArticulatedGroup, gradient: list[Scalar], beyond: Vector) -> tuple[list[Scalar], Vector]:
@@ -166,22 +169,20 @@ def carried_inward(group: ArticulatedGroup, gradient: list[Scalar], beyond: Vect
         beyond: Sum `s` of the elimination at the next group, shape (6,).
 
     Returns:
-        The reduced right-hand side of the group, and `s` at its origin.
+        What the coordinates yield to them, and `s` at the origin of the group.
     """
     factors, beyond = group.eliminated, moved_wrench(beyond, group.reach)
     values = [value + group.motions[:, place] @ beyond for place, value in enumerate(gradient)]
-    reduced = factors.reduced(values)
     total = moved_wrench(beyond, group.shift)
-    for coupling, inverse, value in zip(factors.coupling, factors.inverse_pivots, reduced, strict=True):
-        total = total + coupling * (inverse * value)
-    return reduced, total
+    for gain, value in zip(group.gain, values, strict=True):
+        total = total + gain * value
+    return factors.solved(factors.reduced(values)), total
 
 
-def carried_outward(group: ArticulatedGroup, reduced: list[Scalar], before: Vector) -> tuple[Vector, Vector]:
+def carried_outward(group: ArticulatedGroup, yielded: Vector, before: Vector) -> tuple[Vector, Vector]:
     """Return the corrections of the coordinates of a group, and the acceleration of the next that they give, shape (6,)."""
-    group.eliminated.columns = [reduced]
     after = moved_acceleration(before, group.shift)
-    if not reduced:
+    if not len(yielded):
         return vector([]), moved_acceleration(after, group.reach)
-    steps = group.eliminated.steps(0, before)
+    steps = group.gain @ before - yielded
     return steps, moved_acceleration(after + group.motions @ steps, group.reach)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from softrobots.compiled.motion.motion_layout import MotionLayout
-from softrobots.compiled.motion_settings import KEPT_DIFFERENCES
+from softrobots.compiled.motion_settings import COASTING_ERROR, KEPT_DIFFERENCES
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, absolute, if_less, larger
 
@@ -29,6 +29,9 @@ def choose_order(layout: MotionLayout) -> Block:
         order = if_less(error, least, float(k), order)
         least = if_less(error, least, error, least)
     block.store(layout.weights, if_less(0.5, count, 1.0, 0.0))
+    if layout.coasting:
+        nearer = if_less(block.load(layout.sizes + 1) * COASTING_ERROR, least, 1.0, 0.0)
+        block.store(layout.coasts, if_less(0.5, count, nearer, 0.0))
     for k in range(1, KEPT_DIFFERENCES):
         block.store(layout.weights + k, if_less(k + 0.5, order, 1.0, 0.0))
     block.store_all(layout.sizes, [0.0] * KEPT_DIFFERENCES)

@@ -12,7 +12,7 @@ from softrobots.compiled.motion.extrapolation import beyond_history, compare_cha
 from softrobots.compiled.motion.motion_layout import MotionLayout
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.complex_numbers import ComplexScalar, parts_of
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.expressions import Scalar, if_less
 from softrobots.dynamics.gauss import FROM_SQUARES, SECOND, SQUARES, STAGES, WEIGHTS
 
 
@@ -68,8 +68,17 @@ def _guess(layout: MotionLayout, block: Block) -> Block:
     beyond: list[Scalar] = []
     for stage, share in enumerate(STAGES):
         beyond.append(beyond_history(layout, block, stage, position + h * velocity * share))
+    accelerations = [block.load(layout.stages + stage * n, "i") for stage in range(2)]
+    coasts = block.load(layout.coasts)
     for stage, row in enumerate(FROM_SQUARES):
-        block.store(layout.stages + stage * n, _weighted(row, beyond) / (h * h), "i")
+        guess = _weighted(row, beyond) / (h * h)
+        block.store(layout.stages + stage * n, if_less(0.5, coasts, accelerations[stage], guess), "i")
+    if layout.coasting:
+        gained = (accelerations[0] + accelerations[1]) * (0.5 * h * coasts)  # by the step before, as what it moved
+        moved = (velocity - _weighted(STAGES, accelerations) * (0.5 * h)) * (h * coasts)
+        for stage, share in enumerate(STAGES):
+            torque = block.table("STIFFNESS", 0, "i") * (moved + h * gained * share) + block.load(layout.damping, "i") * gained
+            block.store(layout.forces + stage, torque, "2 * i")
     return block
 
 

@@ -141,9 +141,9 @@ def _trace_kind(
         blocks.append(back)
         sides = [back.spaced(read + stage, len(gradient), stages, plan.row("q")) for stage in range(stages)]
         gradient = right_hand_side(*sides) if layout.in_stages else [*sides[0]]
-    reduced, sums = carried_inward(factors, gradient, _loaded(back, places.sums, 6, places))
+    yielded, sums = carried_inward(factors, gradient, _loaded(back, places.sums, 6, places))
     _store(back, places.sums, sums, places)
-    kept = record.keep(back, vector(reduced)).tolist()
+    kept = record.keep(back, yielded)
     steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6, places))
     shares = steps * (1.0 / plan.massive(step)) if len(steps) and layout.full_damping else steps
     for stage, one in enumerate(corrections(shares) if layout.in_stages else (shares.tolist(),)):
@@ -221,10 +221,9 @@ def _trace_factors(
     _store(factor, places.inertia, [inertia[index] for index in upper_triangle(6)], places)
     factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
     one = found.eliminated
-    lower, inverses, coupling = (record.keep(factor, part) for part in (one.lower, one.inverse_pivots, one.coupling))
-    eliminated = Eliminated(lower, inverses.tolist(), coupling, [])
-    copies = (record.keep(factor, part) for part in (found.motions, found.shift, found.reach))
-    return ArticulatedGroup(eliminated, *copies)
+    lower, inverses = (record.keep(factor, part) for part in (one.lower, one.inverse_pivots))
+    copies = (record.keep(factor, part) for part in (found.gain, found.motions, found.shift, found.reach))
+    return ArticulatedGroup(Eliminated(lower, inverses.tolist(), one.coupling, []), *copies)
 
 
 def _trace_place(block: Block, places: GroupLayout, group: MovingGroup, strains: int) -> None:

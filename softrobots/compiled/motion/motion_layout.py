@@ -15,7 +15,7 @@ from softrobots.compiled.trace.complex_numbers import ComplexScalar
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.dynamics.gauss import EIGENVALUE, GaussRule
 
-_COUNTS = ("unknowns", "full_damping", "order", "strains", "prepared")  # no places for callers
+_COUNTS = ("unknowns", "full_damping", "order", "strains", "coasting", "prepared")  # no places for callers
 _INNER = ("stages", "forces", "mass_damping", "mass_rate")  # places that some robots do not have
 
 
@@ -38,6 +38,8 @@ class MotionLayout:
     """Order of the steps: 2 by the midpoint rule, 4 by the method of Gauss with two stages."""
     strains: int | None = None
     """Number of strains of a looped chain, each with a damper; None for unrolled ones."""
+    coasting: bool = False
+    """Whether steps are guessed from the linear equations of the step before, too."""
     motor_velocities: int = field(init=False)
     """Their velocities there (m) [rad/s or m/s]."""
     motor_accelerations: int = field(init=False)
@@ -92,6 +94,8 @@ class MotionLayout:
     """Length of the step that these are of, of which `time_step` may be a part [s]."""
     share: int = field(init=False)
     """A moment of that step: 0 at its beginning, 1 at its end."""
+    coasts: int = field(init=False)
+    """1 where a step is guessed from the linear equations of the step before, 0 where it is extrapolated."""
     scale: int = field(init=False)
     """What changes of the unknowns are multiplied by to compare them (n) [1/rad or 1/m]."""
     change: int = field(init=False)
@@ -130,7 +134,7 @@ class MotionLayout:
             history=KEPT_DIFFERENCES * k * n, sizes=KEPT_DIFFERENCES, weights=KEPT_DIFFERENCES, n_history=1, last_step=1
         )
         path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1)
-        search = dict(scale=n, change=1, last_change=1, change_before=1, settled=1, failed=1)
+        search = dict(coasts=1, scale=n, change=1, last_change=1, change_before=1, settled=1, failed=1)
         stages = dict(stages=(k - 1) * 2 * n, forces=k * (self.strains or 0) if k == 2 or full else 0)
         assign_places(self, m, **given, **middle, **state, **before, **path, **search, **stages, prepared=0)
 
@@ -159,13 +163,18 @@ class MotionPlan:
         """Places of the numbers of a case."""
         unknowns = self.unknowns
         count, strains = len(moving_coordinates(unknowns)), None if unknowns.is_unrolled else len(unknowns.strains)
-        return MotionLayout(len(unknowns.chain.limits), count, self.full_damping, self.order, strains)
+        coasting = self.order == GaussRule.order and strains is not None and not self.full_damping and not self._joined.routed
+        return MotionLayout(len(unknowns.chain.limits), count, self.full_damping, self.order, strains, coasting)
 
     @cached_property
     def routes(self) -> MotionRoutes | None:
         """Places of actuators on routes and of the strains that they hold; None without any."""
-        layout, joined = self.layout, replace(self.unknowns, chain=self.unknowns.chain.joined)
+        layout, joined = self.layout, self._joined
         return MotionRoutes(joined, layout.prepared, 2 if layout.in_stages else 1) if joined.routed else None
+
+    @property
+    def _joined(self) -> Unknowns:
+        return replace(self.unknowns, chain=self.unknowns.chain.joined)
 
     @property
     def strains(self) -> tuple[int, int, int, int]:

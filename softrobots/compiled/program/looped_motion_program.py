@@ -15,7 +15,7 @@ from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import MovingFrame, joint_state, moved
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_actuators import actuator_parts
-from softrobots.compiled.program.motion_parts import MotionParts
+from softrobots.compiled.program.motion_parts import MotionParts, coast_text
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import cosine, sine
 
@@ -97,6 +97,7 @@ def _control(plan: MotionPlan, bends: bool) -> str:
     evaluate = ("    resist_stages_SUFFIX(w)\n", "") if in_stages else (move, resist)
     text = _CONTROL.replace("FACTOR", evaluate[0] + articulate + evaluate[1] + solve)
     text = text.replace("CORRECT", "".join(evaluate) + solve)
+    text += "\n\n\n" + coast_text(plan, "    start_resist_SUFFIX(w)\n" + solve)
     text = text.replace("CLOSE", "    close_lengths_SUFFIX(w, 0)\n" if held else "")
     text = _STAGES.replace("EVALUATE", move + resist) + text if in_stages else text
     return text.replace("BEND", _BEND if bends else "")

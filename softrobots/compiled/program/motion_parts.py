@@ -68,8 +68,16 @@ def unrolled_motion(plan: MotionPlan) -> MotionParts:
     blocks, size = (_stage_blocks if plan.layout.in_stages else _middle_blocks)(plan, prepare)
     tip = Block("motion_tip", "Write the tip at motors and unknowns.")
     tip.store_all(plan.layout.tip, tip_position(plan, tip))
-    loops = [_STAGES.replace("_SUFFIX", suffix) for suffix in ("", "_lanes")] if plan.layout.in_stages else []
-    return MotionParts([prepare, *blocks, tip], size, loops=loops[:1], lane_loops=loops[1:])
+    text = coast_text(plan, "") + ("\n\n" + _STAGES if plan.layout.in_stages else "")
+    loops = [text.replace("_SUFFIX", suffix) for suffix in ("", "_lanes")]
+    return MotionParts([prepare, *blocks, tip], size, {}, loops[:1], loops[1:])
+
+
+def coast_text(plan: MotionPlan, solve: str) -> str:
+    """Return the function that corrects a guess by the linear equations of the step before, from what solves them."""
+    head = "def motion_coast_SUFFIX(w: Array) -> None:\n"
+    purpose = '    """Write the correction by the torques of coasting, with the factors of the step before."""\n'
+    return head + purpose + (solve if plan.layout.coasting else "    pass\n")
 
 
 def _middle_blocks(plan: MotionPlan, prepare: Block) -> tuple[list[Block], int]:

@@ -38,6 +38,8 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order
     docstring, places = _manual(plan)
     values: dict[str, object] = {name: value for name, value in vars(motion_settings).items() if name.isupper()}
     values |= layout.constants()
+    if layout.coasting:
+        values["STIFFNESS"] = tuple(plan.unknowns.chain.stiffness[list(plan.unknowns.strains)].tolist())
     values |= {"WORKSPACE_SIZE": parts.size, "LANE_SIZE": parts.size, "LANES": lane_count(parts.size)}
     values |= {status.name: status.value for status in _STATUSES} | parts.constants
     text = module_text(docstring, values, blocks, parts.loops, functions_of(motion_drivers))

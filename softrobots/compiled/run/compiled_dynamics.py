@@ -30,6 +30,7 @@ from softrobots.dynamics.time_grid import grid_with_stops, steps_and_rows
 from softrobots.dynamics.time_inputs import MOST_KINKS, MotorPath, TimeLoad
 
 _COMPARED = 401  # times at which tips of two runs are compared, besides those of the rows
+_DUST = 1e-20  # rad, m, or these a second: what Newton leaves of zeros; it grows to what corrections leave, and slows them
 
 
 class CompiledDynamics(CompiledStatics):
@@ -278,7 +279,7 @@ class CompiledDynamics(CompiledStatics):
     def _first_state(self, course: Course, start: Any) -> tuple[FloatArray, FloatArray]:
         """Return unknowns and rates at time zero, each shape (n,), after the motors have begun to move."""
         first, m = first_state(self._model, start, course.path), self._motors
-        springs, rates = first.x[m:][self._moving], first.rates[m:][self._moving]
+        springs, rates = (np.where(np.abs(one) < _DUST, 0.0, one)[m:][self._moving] for one in (first.x, first.rates))
         change = first_kick(course.path, first.rates[:m])
         return springs, rates if change is None else rates + course.spring_kicks.at(first.x[:m], springs, change)
 
