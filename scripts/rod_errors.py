@@ -101,7 +101,8 @@ def _table(count: int, duration: float, steps: dict[str, Any]) -> None:
             cells = [f"{1e3 * error:.2g} mm" for error, _ in found.values()]
             cells.append(f"{1e3 * np.linalg.norm(path - coarse, axis=1).mean():.1g} mm")
             words = f"{1e3 * damping:g} ms" if damping else "none"
-            cells += [f"{1.0 / found[form][1]:.0f}" for form in ("lumped", "flexures")]
+            rates = [1.0 / found[form][1] for form in ("lumped", "flexures")]
+            cells += [f"{rate:.0f}" if rate > 9.5 else f"{rate:.1f}" for rate in rates]
             print(f"| {name} | {aside:.2f} m | {words} | {' | '.join(cells)} |", flush=True)
 
 
