@@ -57,7 +57,8 @@ def rod_frequencies(tip_mass: float) -> np.ndarray:
 def test_a_clamped_rod_rings_at_its_closed_form_frequencies(chain: str, largest: float, tip_mass: float) -> None:
     """Three frequencies, each twice; errors of both signs fall with the length of the sections.
 
-    At 16 the third is 2.8 % off in sections, whose curvature is constant, and 0.03 % between hinges or flexures; twice that is allowed.
+    At 16 the third is 2.8 % off in sections, whose curvature is constant, and 0.03 % between hinges or flexures; twice that
+    is allowed.
     """
     exact, errors = np.repeat(rod_frequencies(tip_mass), 2), []
     for sections in (8, 16):

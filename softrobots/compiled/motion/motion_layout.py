@@ -163,18 +163,15 @@ class MotionPlan:
         """Places of the numbers of a case."""
         unknowns = self.unknowns
         count, strains = len(moving_coordinates(unknowns)), None if unknowns.is_unrolled else len(unknowns.strains)
-        coasting = self.order == GaussRule.order and strains is not None and not self.full_damping and not self._joined.routed
+        routed = replace(unknowns, chain=unknowns.chain.joined).routed
+        coasting = self.order == GaussRule.order and strains is not None and not self.full_damping and not routed
         return MotionLayout(len(unknowns.chain.limits), count, self.full_damping, self.order, strains, coasting)
 
     @cached_property
     def routes(self) -> MotionRoutes | None:
         """Places of actuators on routes and of the strains that they hold; None without any."""
-        layout, joined = self.layout, self._joined
+        layout, joined = self.layout, replace(self.unknowns, chain=self.unknowns.chain.joined)
         return MotionRoutes(joined, layout.prepared, 2 if layout.in_stages else 1) if joined.routed else None
-
-    @property
-    def _joined(self) -> Unknowns:
-        return replace(self.unknowns, chain=self.unknowns.chain.joined)
 
     @property
     def strains(self) -> tuple[int, int, int, int]:

@@ -280,8 +280,7 @@ def replay(
 def _take_parts(recorder: Recorder, end: float) -> None:
     """Take a step to a time [s] that does not succeed as a whole."""
     try:
-        for _ in follow(recorder, np.array([recorder.state.time, end])):
-            pass
+        list(follow(recorder, np.array([recorder.state.time, end])))
     except NoStep as error:
         why = f"the step to {end:g} s has no energies: Pinocchio did not find it again; required shorter steps: {error}"
         raise NotConverged(why, best=None, residual=math.inf, iterations=len(recorder.times)) from error
