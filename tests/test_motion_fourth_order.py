@@ -102,7 +102,7 @@ def test_a_slender_rod_swings_far_by_the_steps_of_simulate() -> None:
     moved = [engine(0.2, (), **options) for engine in (partial(sr.simulate, model), sr.compile(model).simulate)]
     assert np.ptp(moved[0].tip_position[:, 0]) > 0.5
     np.testing.assert_allclose(moved[1].q_springs, moved[0].q_springs, rtol=0, atol=1e-8)
-    assert np.all(moved[1].q_springs[:, [place for place in range(18) if place % 3 != 1]] == 0.0)
+    assert np.all(moved[1].q_springs[:, ::2] == 0.0)  # of four a flexure: bending out of the plane, and twist
 
 
 @pytest.mark.system
