@@ -78,6 +78,7 @@ def motion_step(w: Array) -> int:
         else:
             part *= 0.5
             w[LAST_STEP] = 0.0
+            w[FAILED] = 1.0
             if part < LEAST_PART:
                 w[TIME_STEP] = whole
                 return UNSETTLED

@@ -31,7 +31,7 @@ def choose_order(layout: MotionLayout) -> Block:
     block.store(layout.weights, if_less(0.5, count, 1.0, 0.0))
     if layout.coasting:
         nearer = if_less(block.load(layout.sizes + 1) * COASTING_ERROR, least, 1.0, 0.0)
-        block.store(layout.coasts, if_less(0.5, count, nearer, 0.0))
+        block.store(layout.coasts, if_less(0.5, count, if_less(block.load(layout.failed), 0.5, nearer, 0.0), 0.0))
     for k in range(1, KEPT_DIFFERENCES):
         block.store(layout.weights + k, if_less(k + 0.5, order, 1.0, 0.0))
     block.store_all(layout.sizes, [0.0] * KEPT_DIFFERENCES)

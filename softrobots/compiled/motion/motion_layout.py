@@ -107,7 +107,7 @@ class MotionLayout:
     settled: int = field(init=False)
     """1 where the corrections have converged, 0 where they have not."""
     failed: int = field(init=False)
-    """1 for a lane that has not converged in some step."""
+    """1 after a step that has not converged as a whole: later ones are extrapolated only; of lanes, that one is done alone."""
     stages: int = field(init=False)
     """Accelerations of the unknowns at both stages (2, n)."""
     forces: int = field(init=False)
