@@ -289,13 +289,12 @@ class HelixTube(XacroRobot):
 
     def _chain_along_actuator(self, contraction: float) -> tuple[FloatArray, float]:
         """Strains and rest length of the chain of a real actuator at a contraction."""
-        sign = turning_sign(self.handedness)
-        return actuator_strains(contraction, self.angle, self.diameter, sign), self.length / math.cos(self.angle)
+        strains = actuator_strains(contraction, self.angle, self.diameter, turning_sign(self.handedness))
+        return strains, self.length / math.cos(self.angle)
 
     def _check_sections(self, fewest: int) -> None:
         if fewest > MOST_SECTIONS:
             raise ParameterError("length", self.length, f"so short that {MOST_SECTIONS} sections are enough for its turns")
         if self.elastic_sections < fewest:
-            raise ParameterError(
-                "elastic_sections", self.elastic_sections, f"at least {fewest} for this helix; more are advisable"
-            )
+            required = f"at least {fewest} for this helix; more are advisable"
+            raise ParameterError("elastic_sections", self.elastic_sections, required)

@@ -62,6 +62,7 @@ def motion_step(w: Array) -> int:
     done = 0.0
     part = 1.0
     while done < 1.0:
+        w[PARTS] += 1.0
         w[TIME_STEP] = part * whole
         w[SHARE] = done + 0.5 * part
         for i in range(N_MOTORS):
@@ -134,6 +135,8 @@ def motion_run(
         status = motion_step(w)
         if status != CERTIFIED:
             return status
+        if w[MOST_PARTS] > 0.0 and w[PARTS] > w[MOST_PARTS]:
+            return UNSETTLED
         while row < n_times and (times[row] <= grid[step + 1] or step == n_steps - 1):
             share = (times[row] - grid[step]) / length
             if share > 1.0 - 1e-9:

@@ -94,6 +94,10 @@ class MotionLayout:
     """Length of the step that these are of, of which `time_step` may be a part [s]."""
     share: int = field(init=False)
     """A moment of that step: 0 at its beginning, 1 at its end."""
+    parts: int = field(init=False)
+    """Number of steps and parts of steps that were tried."""
+    most_parts: int = field(init=False)
+    """Number of those after which a run ends as not settled; 0: any number."""
     coasts: int = field(init=False)
     """1 where a step is guessed from the linear equations of the step before, 0 where it is extrapolated."""
     scale: int = field(init=False)
@@ -133,7 +137,7 @@ class MotionLayout:
         before = dict(
             history=KEPT_DIFFERENCES * k * n, sizes=KEPT_DIFFERENCES, weights=KEPT_DIFFERENCES, n_history=1, last_step=1
         )
-        path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1)
+        path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1, parts=1, most_parts=1)
         search = dict(coasts=1, scale=n, change=1, last_change=1, change_before=1, settled=1, failed=1)
         stages = dict(stages=(k - 1) * 2 * n, forces=k * (self.strains or 0) if k == 2 or full else 0)
         assign_places(self, m, **given, **middle, **state, **before, **path, **search, **stages, prepared=0)

@@ -102,7 +102,7 @@ class CompiledDynamics(CompiledStatics):
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
         def take(grid: FloatArray) -> StepsTaken:
-            return take_one(run, state, given, course, grid, times, progress)
+            return take_one(run, state, given, course, grid, times, progress, h is None)
 
         if h is not None:
             taken = take(grid_with_stops(end, h, *course.breaks))
@@ -248,7 +248,7 @@ class CompiledDynamics(CompiledStatics):
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
         def take(grid: FloatArray) -> StepsTaken:
-            return take_batch(run, values, cases, spring_kicks, grid, times, threads, progress)
+            return take_batch(run, values, cases, spring_kicks, grid, times, threads, progress, h is None)
 
         if h is not None:
             few = sum(map(len, cases.breaks)) <= MOST_KINKS

@@ -27,6 +27,7 @@ from softrobots.dynamics.step_control import NoStep, error_share, follow, halved
 from softrobots.dynamics.time_grid import SAME_TIME, grid_of_rows, merged_times
 
 _FIRST_STEPS = 400  # of the first of the runs that are compared
+_PARTS_A_STEP = 4  # on average, of a run that is compared: one with shorter steps is cheaper than more
 _STALLED = 4  # runs in which the error of the tip is to halve at least once
 _CHUNK = 2_000  # steps between two looks for Ctrl-C
 _CASE_STEPS = 10_000_000  # steps times cases between two looks for Ctrl-C, a second or so
@@ -109,14 +110,16 @@ def take_one(
     grid: FloatArray,
     times: FloatArray,
     progress: bool | str = False,
+    compared: bool = False,
 ) -> StepsTaken:
     """Take the steps of a grid from a state, unknowns and rates; `times` are those of the rows.
 
-    A function that fails ends them before that time; its error is raised if there is no step before it.
+    A function that fails ends them before that time; its error is raised if there is no step before it. A run that is
+    `compared` fails where it needs far more parts of steps than it has steps.
     """
     w, layout = run.workspace(), run.layout
     n, last = layout.unknowns, len(grid) - 1
-    for place, values in [(layout.position, state[0]), (layout.velocity, state[1]), *given]:
+    for place, values in [(layout.position, state[0]), (layout.velocity, state[1]), *given, *_bound(run, grid, compared)]:
         run.put(w, place, values)
     rows, status, interrupted = np.full((1, len(times), 2 * n + 3), np.nan), Status.CERTIFIED, False
     rows[0, 0] = np.concatenate([*state, np.zeros(3)])  # even if no step is taken
@@ -154,6 +157,11 @@ def take_one(
     return StepsTaken(grid, rows, np.array([status if failure is None else Status.NOT_A_NUMBER]), interrupted, failure=failure)
 
 
+def _bound(run: Any, grid: FloatArray, compared: bool) -> Given:
+    """Return the most parts that the steps of a run that is compared may be halved to; none for given steps."""
+    return [(run.layout.most_parts, np.array([float(_PARTS_A_STEP * len(grid))]))] if compared else []
+
+
 def _taken_off(parts: list[tuple[int, int]]) -> Iterator[tuple[int, int]]:
     """Take the last part off a list, to which more may be added, until it is empty."""
     while parts:
@@ -169,9 +177,10 @@ def take_batch(
     times: FloatArray,
     threads: int,
     progress: bool | str = False,
+    compared: bool = False,
 ) -> StepsTaken:
     """Take the steps of a grid with many cases; `given` has positions, velocities and what is the same for all cases."""
-    n = run.layout.unknowns
+    n, given = run.layout.unknowns, [*given, *((place, bound[None]) for place, bound in _bound(run, grid, compared))]
     out = np.full((cases.count, len(times), 2 * n + 3), np.nan)
     statuses = np.full(cases.count, Status.UNSETTLED, dtype=np.uint8)  # until a case is at its end
     places = tuple(place for place, _ in given)
