@@ -15,6 +15,7 @@ import math
 import operator
 import re
 from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 _MARK = re.compile("\ue000([0-9]+)\ue001")  # private characters, which XML allows and no robot has
@@ -42,8 +43,8 @@ class Tape:
     def functions(self) -> dict[str, Callable[..., Any]]:
         """Return the functions on numbers that expressions call, by name, as ones that write on the tape."""
         functions = {name: self._traced(own) for name, own in vars(math).items() if callable(own)}
-        of_all = {"min": _of_all(min), "max": _of_all(max), "fsum": _of_all(math.fsum)}
-        return functions | {name: self._traced(own, of_all=True) for name, own in of_all.items()} | {"float": self._float}
+        of_all = {name: self._traced(own, of_all=True) for name, own in _OF_ALL.items()}
+        return functions | of_all | {"float": self._float}
 
     def literal(self, text: Any) -> TracedNumber | None:
         """Return the number whose mark the whole text is, or None."""
@@ -167,5 +168,8 @@ class TracedNumber:
     __trunc__, __floor__, __ceil__ = _operation(math.trunc), _operation(math.floor), _operation(math.ceil)
 
 
-def _of_all(function: Callable[..., Any]) -> Callable[..., Any]:
-    return lambda *items, **named: function(items, **named)
+def _of_all(function: Callable[..., Any], *items: Any, **named: Any) -> Any:
+    return function(items, **named)
+
+
+_OF_ALL = {name: partial(_of_all, function) for name, function in (("min", min), ("max", max), ("fsum", math.fsum))}
