@@ -250,8 +250,8 @@ def sensitivity(
 
     By implicit differentiation at the state (`softrobots.identification.residual_derivatives`): exact to 1e-8, without solving
     for another equilibrium. The first call for a robot and names loads four robots for each name, which is kept. After that the
-    `gradient` of a new equilibrium, with all that is prepared for it, takes as long as two to three solved equilibria of an arm, 0.8
-    of a tendon arm, whatever the number of parameters; a further one of the same equilibrium as long as 0.7 and 0.35.
+    `gradient` of a new equilibrium, with all that is prepared for it, takes as long as two to three equilibria of an arm,
+    0.8 of a tendon arm, whatever the number of parameters; a further one of the same equilibrium as long as 0.7 and 0.35.
 
     At a knee (the end of a plateau, a tendon that goes slack) they are the derivatives of the side that the state is on.
     Friction of sections that bend slips or sticks as it does, and what it remembers stays. Pressed contacts stay pressed.
