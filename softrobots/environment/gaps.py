@@ -15,6 +15,7 @@ the obstacle (edges, rims), which hold a core that lies flat, where the nearest 
 from __future__ import annotations
 
 import math
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -261,7 +262,7 @@ class Surroundings:
         self._cores, self._itself = cores_of(model), environment.self_contact
         self._pairs = self_contact_pairs(model, self._cores) if environment.self_contact else None
         self._fields, self._transforms = obstacle_fields(environment), obstacle_transforms(environment)
-        self._reach, self._last = model.reach, dict[Any, Gaps]()
+        self._reach, self._kept = model.reach, lru_cache(maxsize=_KEPT)(self._at)
         self._links = tuple(one.link for one in self._cores.capsules)
         self._names = (*environment.names, *self._links)  # of obstacles, and of capsules, which the robot itself may touch
 
@@ -284,13 +285,9 @@ class Surroundings:
         Returns:
             The candidates with their derivatives.
         """
-        key = q.tobytes(), margin
-        gaps = self._last.pop(key, None)
-        if gaps is None:
-            places = self._cores.at(q)
-            found = find_candidates(self._cores, places, self._fields, self._pairs, margin, SAME_POINT * self._reach)
-            gaps = Gaps(self._cores, places, found, self._transforms, self._reach, self._itself)
-            if len(self._last) == _KEPT:
-                del self._last[next(iter(self._last))]
-        self._last[key] = gaps
-        return gaps
+        return self._kept(q.tobytes(), margin)
+
+    def _at(self, configuration: bytes, margin: float) -> Gaps:
+        places = self._cores.at(np.frombuffer(configuration))
+        found = find_candidates(self._cores, places, self._fields, self._pairs, margin, SAME_POINT * self._reach)
+        return Gaps(self._cores, places, found, self._transforms, self._reach, self._itself)

@@ -138,6 +138,8 @@ def number_slopes(
         try:
             yield from list(each(group))
         except ParameterError:  # one of them has no room on one side, or changes more here
+            if len(group) == 1:
+                raise
             for place, touched in group.items():
                 yield from each({place: touched})
 

@@ -218,7 +218,7 @@ class LoadedTip:
         elongations, stretch = np.zeros(count), slope[:0]
         if len(rows):
             paths = model.structure.muscle_paths.at(state.q_springs)
-            elongations, stretch = paths.elongation, (paths.arms @ follow)[rows] / rests
+            elongations, stretch = paths.elongation, (paths.arms @ follow)[rows] / rests[:, None]
         tensions, scale = state.load.motors[-count:], model.actuators.tension_scale
         limited = np.concatenate([slope / scale, stretch])
         beyond = (tensions - model.actuators.wanted_tensions) / scale

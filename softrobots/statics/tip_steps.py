@@ -15,6 +15,7 @@ Where the steps end, the conditions of Karush, Kuhn and Tucker of the least tens
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -69,10 +70,11 @@ class Pull(NamedTuple):
         return max(0.0, -float(self.room.min()))
 
 
+@lru_cache(maxsize=64)
 def given_tensions(model: SoftModel) -> tuple[NDArray[np.intp], FloatArray]:
-    """Return the muscles of given tension, whose lengths no input keeps within limits, and these at rest, shape (n, 1) [m]."""
+    """Return the muscles of given tension, whose lengths no input keeps within limits, and these at rest, shape (n,) [m]."""
     rows = np.flatnonzero([muscle.kind == "tension" for muscle in model.muscles])
-    return rows, np.array([[muscle.rest_length] for muscle in model.muscles]).reshape(-1, 1)[rows]
+    return rows, np.array([muscle.rest_length for muscle in model.muscles])[rows]
 
 
 def muscle_room(model: SoftModel, tensions: FloatArray, elongations: FloatArray) -> FloatArray:
@@ -88,8 +90,8 @@ def muscle_room(model: SoftModel, tensions: FloatArray, elongations: FloatArray)
     """
     (low, high), scale = model.actuators.sought_tensions.T, model.actuators.tension_scale
     rows, rests = given_tensions(model)
-    least, longest = (model.actuators.muscle_lengths[rows] / rests - 1.0).T
-    stretch = elongations[rows] / rests[:, 0]
+    least, longest = model.actuators.muscle_lengths[rows].T / rests - 1.0
+    stretch = elongations[rows] / rests
     tension = np.array([tensions - low, high - tensions]) / scale
     return np.concatenate([tension, np.array([stretch - least, longest - stretch]) - _INSIDE], axis=1)
 

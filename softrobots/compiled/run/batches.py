@@ -13,6 +13,8 @@ from softrobots.compiled.statuses import Status
 from softrobots.core.checks import LARGEST, FloatArray, finite_array, positive_integer
 from softrobots.core.errors import ParameterError
 
+_DUST = 1e-20  # rad, m, or these a second
+
 
 def batch_rows(**arrays: tuple[Any, int]) -> list[FloatArray]:
     """Return arrays with one row a case each; a single row is repeated for all cases.
@@ -86,6 +88,11 @@ def unusable(*arrays: FloatArray) -> Any:
         if array.size and not (array.min() >= -LARGEST and array.max() <= LARGEST):  # rarely; both are NaN if a number is
             bad |= ~np.all(np.abs(array) <= LARGEST, axis=1)
     return bad
+
+
+def without_dust(array: FloatArray) -> FloatArray:
+    """Return coordinates or rates in which what Newton's method leaves of zeros is zero: steps of time would make it grow."""
+    return np.where(np.abs(array) < _DUST, 0.0, array)
 
 
 def without(array: FloatArray, bad: Any, instead: Any = 0.0) -> FloatArray:

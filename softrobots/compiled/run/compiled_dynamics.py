@@ -11,7 +11,7 @@ import numpy as np
 from softrobots.compiled.motion.held_motion import moving_coordinates
 from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
-from softrobots.compiled.run.batches import fail, gravity_vector
+from softrobots.compiled.run.batches import fail, gravity_vector, without_dust
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
 from softrobots.compiled.run.motion_batch import MotionBatch
 from softrobots.compiled.run.motion_cases import MotionCases
@@ -30,7 +30,6 @@ from softrobots.dynamics.time_grid import grid_with_stops, steps_and_rows
 from softrobots.dynamics.time_inputs import MOST_KINKS, MotorPath, TimeLoad
 
 _COMPARED = 401  # times at which tips of two runs are compared, besides those of the rows
-_DUST = 1e-20  # rad, m, or these a second: what Newton leaves of zeros; it grows to what corrections leave, and slows them
 
 
 class CompiledDynamics(CompiledStatics):
@@ -279,7 +278,7 @@ class CompiledDynamics(CompiledStatics):
     def _first_state(self, course: Course, start: Any) -> tuple[FloatArray, FloatArray]:
         """Return unknowns and rates at time zero, each shape (n,), after the motors have begun to move."""
         first, m = first_state(self._model, start, course.path), self._motors
-        springs, rates = (np.where(np.abs(one) < _DUST, 0.0, one)[m:][self._moving] for one in (first.x, first.rates))
+        springs, rates = (without_dust(one[m:][self._moving]) for one in (first.x, first.rates))
         change = first_kick(course.path, first.rates[:m])
         return springs, rates if change is None else rates + course.spring_kicks.at(first.x[:m], springs, change)
 

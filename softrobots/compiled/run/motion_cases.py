@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
-from softrobots.compiled.run.batches import batch_rows, unusable, without
+from softrobots.compiled.run.batches import batch_rows, unusable, without, without_dust
 from softrobots.compiled.run.motion_batch import MotionBatch
 from softrobots.compiled.run.motion_course import SpringKicks, forces_of_steps, motors_of_steps
 from softrobots.compiled.run.results import EquilibriumBatch
@@ -60,7 +60,7 @@ class MotionCases:
         self.failures: dict[int, tuple[float, Exception]] = {}
         """Time [s] before which a function of a case has failed, and its error, by case."""
         self._motors, self._forces = without(motors, self.bad, model.relaxed_motors), without(pushes, self.bad)
-        self.state = without(springs, self.bad, model.rest), without(rates, self.bad)
+        self.state = without_dust(without(springs, self.bad, model.rest)), without_dust(without(rates, self.bad))
         """Elastic coordinates and rates at the start, each shape (n, n_springs)."""
 
     @property
