@@ -17,9 +17,9 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.description import recorded_expansions
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
-from softrobots.robots import variants as variants_module
 from softrobots.robots.fields import PerPart, XacroRobot, check_parameters, facts_of, parameter, per_part
 from softrobots.robots.variants import Variants
 
@@ -134,7 +134,7 @@ def expansions(monkeypatch: pytest.MonkeyPatch) -> list[str]:
         made.append(Path(path).name)
         return expand(path, *rest)
 
-    monkeypatch.setattr(variants_module, "expand", counted)
+    monkeypatch.setattr(recorded_expansions, "expand", counted)
     return made
 
 

@@ -6,7 +6,6 @@ them, and a test compares the xacro files with them.
 
 from __future__ import annotations
 
-import contextlib
 import dataclasses
 import inspect
 from collections.abc import Sequence
@@ -17,17 +16,15 @@ from typing import Any, ClassVar, Literal, TypeVar
 
 import numpy as np
 
-from softrobots.core.errors import DescriptionError, FieldNotFound, ParameterError
+from softrobots.core.errors import FieldNotFound, ParameterError
 from softrobots.core.summary import Part, Summarised, facts, field_facts
 from softrobots.description.expansion import expand
-from softrobots.description.number_tape import Tape
 from softrobots.description.paths import xacro_folder
+from softrobots.description.recorded_expansions import RecordedExpansions
 from softrobots.robots.field_values import checked_value, numbers, within
 
 MOST_PARTS = 1000
 """Largest number of links or segments; xacro takes minutes for that many."""
-
-_MOST_TAPES = 16  # of a robot that grows; they differ in how comparisons came out
 
 _ELSEWHERE = {
     "payload": ["a load on the tip of any robot: force= or wrench= of the solvers, or a body by softrobots.mount(robot, body)"]
@@ -231,22 +228,19 @@ class XacroRobot(Summarised):
 
 @lru_cache(maxsize=64)
 def _expanded(xacro_file: str | Path, arguments: tuple[tuple[str, str], ...], grows: bool) -> str:
-    """URDF text; of a robot that grows by the tape of an expansion that only its argument `length` distinguishes from this."""
+    """URDF text; of a robot that grows by a recorded expansion that only its argument `length` distinguishes from this."""
     path, given = xacro_folder() / xacro_file, dict(arguments)
     if grows:
-        number, tapes = [float(given["length"])], _tapes(xacro_file, tuple(one for one in arguments if one[0] != "length"))
-        if (texts := next(filter(None, (tape.texts(number) for tape in tapes)), None)) is None and len(tapes) < _MOST_TAPES:
-            tapes.append(tape := Tape(number))
-            with contextlib.suppress(DescriptionError, ArithmeticError, ValueError, TypeError, AttributeError):  # expanded anew
-                texts = tape.texts(number) if tape.keep(expand(path, given | {"length": str(tape.numbers[0])}, tape)) else None
-        if texts is not None:
-            return texts[0]
+        expansions = _of_lengths(path, tuple(one for one in arguments if one[0] != "length"))
+        text = expansions.text([float(given["length"])], given, lambda numbers: given | {"length": str(numbers[0])})
+        if text is not None:
+            return text
     return expand(path, given)
 
 
 @lru_cache(maxsize=16)
-def _tapes(xacro_file: str | Path, others: tuple[tuple[str, str], ...]) -> list[Tape]:
-    return []
+def _of_lengths(path: Path, others: tuple[tuple[str, str], ...]) -> RecordedExpansions:
+    return RecordedExpansions(path)
 
 
 def default_text(field: Field[Any]) -> str:

@@ -6,36 +6,27 @@
     load_model(other)                   # other.urdf() is at hand, digit for digit that of any equal robot; xacro does not run
     variants.urdf(values)               # that text alone
 
-The first variant takes an expansion by xacro, and so does one in which a comparison in the xacro file comes out otherwise
-than in those before (`softrobots.description.number_tape`).
+Their texts are those of `softrobots.description.recorded_expansions`.
 """
 
 from __future__ import annotations
 
 import copy
 import dataclasses
-import threading
-from collections import deque
 from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of
-from softrobots.core.errors import DescriptionError, ParameterError
-from softrobots.description.expansion import expand
-from softrobots.description.number_tape import Tape
+from softrobots.core.errors import ParameterError
 from softrobots.description.paths import xacro_folder
+from softrobots.description.recorded_expansions import RecordedExpansions
 from softrobots.robots.fields import XacroRobot, facts_of
 from softrobots.robots.routes import Route
 
 Part = int | tuple[int | str, ...] | None
 """Which number of a field: None for its only one, or its place, from 0; (route, "distance", place) of a route."""
-
-MOST_TAPES = 16
-"""Most expansions that are kept; they differ in how comparisons came out."""
-
-_TRACING = threading.Lock()
 
 
 class Variants:
@@ -57,7 +48,7 @@ class Variants:
         for field, path in zip(fields, self._paths, strict=True):
             if path[0] not in facts_of(robot) or type(_number(robot, path)) is not float or self._paths.count(path) > 1:
                 raise ParameterError("fields", field, "pairs (field, part) that name numbers of the robot, each once")
-        self._tapes: deque[Tape] = deque(maxlen=MOST_TAPES)
+        self._expansions = RecordedExpansions(xacro_folder() / robot.XACRO)
 
     @property
     def values(self) -> FloatArray:
@@ -106,33 +97,10 @@ class Variants:
         return robot
 
     def _text(self, robot: XacroRobot) -> str:
-        text = self._text_of_tapes(robot)
-        if text is None:
-            with _TRACING:  # another thread may have made the tape in the meantime
-                text = self._text_of_tapes(robot)
-                if text is None and self._add_tape(robot):
-                    text = self._text_of_tapes(robot)
+        text = self._expansions.text(
+            self._numbers(robot), robot.xacro_arguments(), lambda numbers: self._with(robot, numbers).xacro_arguments()
+        )
         return robot.urdf() if text is None else text
-
-    def _text_of_tapes(self, robot: XacroRobot) -> str | None:
-        numbers, arguments = self._numbers(robot), list(robot.xacro_arguments().values())
-        for tape in tuple(self._tapes):
-            texts = tape.texts(numbers)
-            if texts is not None and texts[1:] == arguments:
-                return texts[0]
-        return None
-
-    def _add_tape(self, robot: XacroRobot) -> bool:
-        """Expand the description of a robot on a new tape, or return False where a tape cannot follow."""
-        tape = Tape(self._numbers(robot))
-        try:
-            arguments = self._with(robot, tape.numbers).xacro_arguments()
-            followed = tape.keep(expand(xacro_folder() / robot.XACRO, arguments, tape), *arguments.values())
-        except (DescriptionError, ArithmeticError, ValueError, TypeError, AttributeError):  # or xacro refuses the numbers
-            return False
-        if followed:
-            self._tapes.appendleft(tape)
-        return followed
 
 
 def _number(value: Any, path: Sequence[Any]) -> Any:
