@@ -23,13 +23,13 @@ from tqdm import tqdm
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.files import make_folder, write_text
 from softrobots.view.figures import canvas
 from studies.agreement.comparison import compare
 from studies.agreement.pictures import figure
 from studies.agreement.robots import STUDIES
 from studies.agreement.tables import table
+from studies.interop.tools import find_tool
 from studies.shared.checkout import CHECKOUT
 from studies.shared.folders import free_folder
 from studies.shared.recorded_run import check_page, command_of, write_record

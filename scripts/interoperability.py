@@ -19,12 +19,12 @@ from pathlib import Path
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.cli.tools.known_tools import TOOLS
 from softrobots.core.files import make_folder, new_file, write_text
 from softrobots.view.figures import canvas
 from studies.interop.measurement import POSES, ROBOTS, agreed, measure
 from studies.interop.results import as_json, read_results, write_docs
 from studies.interop.tables import document
+from studies.interop.tools import TOOLS
 from studies.shared.checkout import CHECKOUT
 
 

@@ -19,10 +19,10 @@ import pytest
 import softrobots as sr
 from softrobots.cli.main import COMMANDS, main, parser
 from softrobots.cli.options.robot_parameters import make_robot, robot_parameters, xacro_parameters
-from softrobots.cli.tools.known_tools import TOOLS
 from softrobots.description.expansion import expand
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.description.urdf_rules import RULES
+from studies.interop.tools import TOOLS
 from tests.conftest import missing
 from tests.support.foreign import BRANCHED, SPRINGS
 from tests.support.tables import each_row

@@ -582,7 +582,10 @@ def test_a_first_waypoint_out_of_reach(solver: CompiledModel) -> None:
         (lambda c: c.equilibrium(np.zeros(3), q_springs0=(0.0, 0.0)), "q_springs0"),
         (lambda c: c.equilibrium(np.zeros(3), q_springs0=(0.0, 0.0, 0.0, np.inf)), "q_springs0"),
         (lambda c: c.equilibria(np.zeros((4, 2)), np.zeros(3)), "q_motors"),
-        (lambda c: c.equilibria(np.zeros((4, 3)), np.zeros((5, 3))), "as many rows"),
+        (
+            lambda c: c.equilibria(np.zeros((4, 3)), np.zeros((5, 3))),
+            r"^q_motors = array\(.*: q_motors must be of as many rows as the others have \(q_motors 4, forces 5\)$",
+        ),
         (lambda c: c.equilibria(np.zeros((4, 3)), np.zeros((2, 2, 3))), "forces"),
         (lambda c: c.equilibria([["a", "b", "c"]], np.zeros(3)), "q_motors"),
         (lambda c: c.equilibria(np.zeros((4, 3)), np.zeros(3), gravity=(0.0, 0.0)), "gravity"),

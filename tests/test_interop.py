@@ -19,13 +19,14 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots.cli.tools import known_tools as tools
 from softrobots.cli.tools.kinematics import compare_kinematics, pose_error
-from softrobots.cli.tools.known_tools import TOOLS, find_tool, installed_tools
 from softrobots.description.paths import urdf_folder
 from softrobots.description.tag_reader import read_tags
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.robots import HelixTube, InflatableArm, PccArm, Robot
+from studies.interop import tools
+from studies.interop.kinematics import compare_tools
+from studies.interop.tools import TOOLS, find_tool, installed_tools
 from tests.conftest import missing, skip_without_bullet_wheels
 from tests.support.foreign import BRANCHED, INERTIAL, joint
 from tests.support.mujoco_balance import assert_mujoco_balances
@@ -63,7 +64,7 @@ def needed(name: str) -> str:
 @pytest.mark.parametrize("name", TOOLS)
 def test_every_link_of_a_shipped_file_is_where_pinocchio_has_it(name: str, file: Path) -> None:
     """At 20 configurations within the limits; 1e-9 in tools of double precision (1e-14 measured), 1e-5 in PyBullet (6e-7)."""
-    (row,) = compare_kinematics(file, [needed(name)])
+    (row,) = compare_tools(file, [needed(name)])
     model = pin.buildModelFromUrdf(str(file))
     tolerance = 1e-9 if name in DOUBLE else 1e-5
     assert row.problem == ""
@@ -112,7 +113,7 @@ LIGHT = ELBOW.replace("0 2 0", "0 1 0").replace('<mass value="0.5"/>', '<mass va
 )
 def test_a_tool_that_errs_does_not_agree(name: str, urdf: str, what: str) -> None:
     """Errors that are known of the tools, so that the comparison is seen to find them."""
-    (row,) = compare_kinematics(urdf, [needed(name)])
+    (row,) = compare_tools(urdf, [needed(name)])
     assert not row.agrees
     found = getattr(row, what)
     assert found > 0.01 if isinstance(found, float) else found
@@ -120,7 +121,7 @@ def test_a_tool_that_errs_does_not_agree(name: str, urdf: str, what: str) -> Non
 
 
 def test_a_tool_that_refuses_a_file_says_why() -> None:
-    (row,) = compare_kinematics(LIGHT, [needed("MuJoCo")])
+    (row,) = compare_tools(LIGHT, [needed("MuJoCo")])
     assert "mass and inertia of moving bodies must be larger than mjMINVAL" in row.problem
     assert (row.joints, row.links, row.lost_links) == (0, 0, ("base", "upper", "hand"))
 
@@ -139,7 +140,7 @@ def long_chain(movable: int, fixed: int) -> str:
 )
 def test_how_many_joints_pybullet_takes(movable: int, fixed: int, agrees: bool) -> None:
     """It loads 123, but the last one stays at zero without a word."""
-    (row,) = compare_kinematics(long_chain(movable, fixed), [needed("PyBullet")], count=2)
+    (row,) = compare_tools(long_chain(movable, fixed), [needed("PyBullet")], count=2)
     assert row.joints_in_file == movable
     assert row.agrees == agrees
     assert TOOLS["PyBullet"].limits.startswith("at most 122 movable joints, and 127 with the fixed ones")
@@ -150,14 +151,14 @@ def test_pybullet_breaks_lines_of_8192_characters() -> None:
     for start, agrees in ((8173, False), (8000, True)):
         text = FORK.replace(INERTIAL, " " * (start - FORK.index(INERTIAL)) + INERTIAL, 1)
         assert text[start + 16 :].startswith("value")
-        (row,) = compare_kinematics(text, [needed("PyBullet")], count=2)
+        (row,) = compare_tools(text, [needed("PyBullet")], count=2)
         assert row.agrees == agrees
 
 
 @pytest.mark.parametrize("name", TOOLS)
 def test_branches_sliders_and_wheels_are_compared_too(name: str) -> None:
     """ikpy follows one branch, MuJoCo knows the root as its world: the joints and links that are there are in place."""
-    (row,) = compare_kinematics(BRANCHED, [needed(name)], count=5)
+    (row,) = compare_tools(BRANCHED, [needed(name)], count=5)
     assert row.joints == (4 if name == "ikpy" else 5)
     assert set(row.lost_links) == {"ikpy": {"side"}, "MuJoCo": {"base"}}.get(name, set())
     assert max(row.position_error, row.rotation_error) < row.precision
@@ -166,7 +167,7 @@ def test_branches_sliders_and_wheels_are_compared_too(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name in TOOLS if name != "Drake"])
 def test_mimicking_joints_follow(name: str) -> None:
     """In the tools that couple them, and set by hand in those that do not."""
-    (row,) = compare_kinematics(MIMIC, [needed(name)], count=5)
+    (row,) = compare_tools(MIMIC, [needed(name)], count=5)
     assert max(row.position_error, row.rotation_error) < row.precision
     assert row.joints == 2
 
@@ -194,7 +195,7 @@ def test_the_draw_keeps_the_limits_and_can_be_repeated(monkeypatch: pytest.Monke
 
     monkeypatch.setattr(kinematics, "_pinocchio_poses", spy)
     for seed in (1, 1, 2):
-        compare_kinematics(FILE, ["yourdfpy"], count=7, seed=seed)
+        compare_kinematics(FILE, count=7, seed=seed)
     assert drawn[:7] == drawn[7:14]
     assert drawn[:7] != drawn[14:]
     model = pin.buildModelFromUrdf(str(FILE))
@@ -217,7 +218,7 @@ def test_the_draw_keeps_the_limits_and_can_be_repeated(monkeypatch: pytest.Monke
 )
 def test_what_cannot_be_compared_is_refused(source: object, options: dict, error: type, message: str) -> None:
     with pytest.raises(error, match=message):
-        compare_kinematics(source, **options)
+        compare_tools(source, **options)
 
 
 def test_a_tool_that_is_missing_or_broken_is_told_apart(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -226,13 +227,13 @@ def test_a_tool_that_is_missing_or_broken_is_told_apart(monkeypatch: pytest.Monk
 
     monkeypatch.setattr(tools.importlib, "import_module", broken)
     with pytest.raises(sr.SoftRobotsError, match=r"yourdfpy .* cannot be imported: no yourdfpy"):
-        compare_kinematics(FILE, ["yourdfpy"])
+        compare_tools(FILE, ["yourdfpy"])
     monkeypatch.setattr(tools, "installed_version", lambda package: None)
     with pytest.raises(sr.MissingDependency, match=r"ikpy is not installed.*softrobots\[interop-kinematics\]"):
-        compare_kinematics(FILE, ["ikpy"])
+        compare_tools(FILE, ["ikpy"])
     with pytest.raises(sr.MissingDependency, match=r"drake is not installed.*softrobots\[interop\]"):
         find_tool("Drake").load()
-    assert compare_kinematics(FILE) == ()  # by default what is installed
+    assert compare_tools(FILE) == ()  # by default what is installed
 
 
 # --- Parsers that check
@@ -422,7 +423,7 @@ def test_any_robot_is_refused_with_a_reason_or_the_same_in_every_tool(
         assert isinstance(error, sr.ParameterError | sr.SelfIntersection | sr.DescriptionError)
         assert len(str(error)) > 20
         return
-    for row in compare_kinematics(robot, ["yourdfpy", "MuJoCo"], count=5):
+    for row in compare_tools(robot, ["yourdfpy", "MuJoCo"], count=5):
         assert row.agrees, row
     written = math.fsum(float(mass.get("value")) for mass in ElementTree.fromstring(urdf).iter("mass"))
     assert sum(inertia.mass for inertia in pin.buildModelFromXML(urdf).inertias) == pytest.approx(written, rel=1e-12)

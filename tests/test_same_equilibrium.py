@@ -379,6 +379,6 @@ def test_the_script_refuses_to_compare_nothing(capsys: pytest.CaptureFixture) ->
 
 
 def test_the_script_tells_of_a_tool_that_is_missing(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
-    monkeypatch.setattr("softrobots.cli.tools.known_tools.installed_version", lambda package: None)
+    monkeypatch.setattr("studies.interop.tools.installed_version", lambda package: None)
     assert run_script(["--tools", "Drake"]) == 2
     assert "pip install 'softrobots[interop]'" in capsys.readouterr().err

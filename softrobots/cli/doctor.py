@@ -11,9 +11,8 @@ from typing import Any, NamedTuple
 import softrobots
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.tools.checks import row_problems
-from softrobots.cli.tools.kinematics import COUNT, KinematicsRow, compare_kinematics
-from softrobots.cli.tools.known_tools import installed_tools
-from softrobots.cli.tools.packages import EXTRAS, missing_of_extras, required_packages
+from softrobots.cli.tools.kinematics import COUNT, PlacedLinks, compare_kinematics
+from softrobots.cli.tools.packages import EXTRAS, installed_version, missing_of_extras, required_packages
 from softrobots.compiled.run.backends import available_backend, cache_folder, cache_is_kept
 from softrobots.core.errors import SoftRobotsError, ViewerError
 from softrobots.core.summary import aligned
@@ -35,7 +34,6 @@ def add_parser(subparsers: Any) -> None:
         "generates, and how far yourdfpy's kinematics of them is from Pinocchio's. Exit status 0 if all that is required is "
         "fine, 1 if not.",
     )
-    parser.add_argument("--all", action="store_true", help="compare the kinematics of every installed tool (of yourdfpy)")
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -64,7 +62,7 @@ def run(arguments: argparse.Namespace) -> bool:
     if folder is not None and not report.wrong:
         _page(report)
         _files(folder, report)
-        _kinematics(folder, installed_tools() if arguments.all else ("yourdfpy",), report)
+        _kinematics(folder, report)
     report.answer.update(wrong=report.wrong, ok=not report.wrong)
     end = ["wrong:", *(f"  {text}" for text in report.wrong)] if report.wrong else ["all well"]
     print_answer(arguments, report.answer, [*report.lines, "", *end])
@@ -162,27 +160,25 @@ def _files(folder: Path, report: _Report) -> None:
     report.add("URDF files, and what xacro generates now", cells)
 
 
-def _kinematics(folder: Path, tools: Sequence[str], report: _Report) -> None:
-    """Where the tools place the links of the shipped files."""
+def _kinematics(folder: Path, report: _Report) -> None:
+    """Where yourdfpy places the links of the shipped files."""
     from tqdm import tqdm
 
-    rows: list[KinematicsRow] = []
-    pairs = [(folder / f"{name}.urdf", tool) for name in ROBOTS for tool in tools]
-    for path, tool in tqdm(pairs, desc="kinematics", unit="robot", leave=False, disable=None):
+    rows: list[PlacedLinks] = []
+    for name in tqdm(ROBOTS, desc="kinematics", unit="robot", leave=False, disable=None):
         try:
-            rows += compare_kinematics(path, [tool])
+            rows.append(compare_kinematics(folder / f"{name}.urdf"))
         except SoftRobotsError as error:
             report.wrong.append(str(error))
+    tool = {"tool": "yourdfpy", "version": str(installed_version("yourdfpy"))}
     report.answer["kinematics"] = [
-        {
-            **{name: getattr(row, name) for name in ("file", "tool", "version", "position_error", "rotation_error")},
-            "problems": row_problems(row),
-        }
+        {"file": row.file, **tool, "position_error": row.position_error, "rotation_error": row.rotation_error}
+        | {"problems": row_problems(row)}
         for row in rows
     ]
     cells = []
     for row in rows:
         measured = (f"{row.position_error:.1e} m", f"{row.rotation_error:.1e} rad", f"{row.links} links, {row.joints} joints")
-        cells.append((row.file, row.tool, row.version, *measured, *row_problems(row)))
+        cells.append((row.file, *tool.values(), *measured, *row_problems(row)))
     report.add(f"Largest difference from Pinocchio's kinematics at {COUNT} random configurations", cells)
     report.wrong.extend(f"{row.file}: {text}" for row in rows for text in row_problems(row))

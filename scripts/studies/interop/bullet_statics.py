@@ -8,9 +8,9 @@ from types import ModuleType
 
 import numpy as np
 
-from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.errors import NotConverged
 from studies.interop.outcomes import SECONDS, Outcome, Question
+from studies.interop.tools import find_tool
 
 
 def simulate(question: Question, seconds: float = SECONDS) -> Outcome:

@@ -7,12 +7,12 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NotConverged
 from softrobots.export.sdf_contact import SURROUNDINGS
 from studies.interop.newton import balance_point
 from studies.interop.outcomes import ITSELF, SECONDS, Outcome, Question
+from studies.interop.tools import find_tool
 
 TIME_STEP = 1e-2
 """Time step of the discrete plant [s]; where it comes to rest does not depend on it."""

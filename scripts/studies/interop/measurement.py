@@ -10,13 +10,13 @@ from typing import Any
 from tqdm import tqdm
 
 import softrobots as sr
-from softrobots.cli.tools.kinematics import compare_kinematics
-from softrobots.cli.tools.known_tools import TOOLS
 from softrobots.description.paths import urdf_folder
 from softrobots.export import to_mjcf, to_sdf
 from studies.interop.cases import WELDED, equilibrium_cases
+from studies.interop.kinematics import compare_tools
 from studies.interop.simulators import SIMULATORS, compare_equilibrium
 from studies.interop.springs_read import FORMATS, springs_read
+from studies.interop.tools import TOOLS
 
 ROBOTS = {"inflatable_arm": "inflatable arm", "pcc_arm_lumped": "arm of muscles", "helix_tube_lumped": "helical tube"}
 """Robots of the equilibria, and what the tables call them."""
@@ -48,7 +48,7 @@ def measure(arguments: argparse.Namespace) -> Results:
                 results["equilibrium"].append(dataclasses.asdict(row) | {"agrees": row.agrees})
     if not arguments.equilibrium_only:
         for file in tqdm(sorted(urdf_folder().glob("*.urdf")), desc="kinematics", unit="file"):
-            rows = compare_kinematics(file, tools)
+            rows = compare_tools(file, tools)
             results["kinematics"] += [dataclasses.asdict(row) | {"agrees": row.agrees} for row in rows]
     return results
 

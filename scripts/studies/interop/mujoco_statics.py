@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NotConverged, ParameterError
 from studies.interop.newton import balance_point
 from studies.interop.outcomes import ITSELF, SECONDS, Outcome, Question
+from studies.interop.tools import find_tool
 
 REFRESH = 50
 """Steps after which the load is written anew (0.1 s at MuJoCo's default time step)."""

@@ -7,15 +7,15 @@ import json
 from pathlib import Path
 
 import softrobots as sr
-from softrobots.cli.tools.kinematics import KinematicsRow
-from softrobots.cli.tools.known_tools import TOOLS
 from softrobots.core.files import write_text
 from softrobots.core.json_text import read_json
 from softrobots.view.figures import canvas
+from studies.interop.kinematics import KinematicsRow
 from studies.interop.measurement import POSES, ROBOTS, Results
 from studies.interop.pictures import figure
 from studies.interop.simulators import SIMULATORS, EquilibriumRow
 from studies.interop.tables import document
+from studies.interop.tools import TOOLS
 from studies.shared.markdown import marked
 
 BEGIN, END = "<!-- interoperability:begin -->", "<!-- interoperability:end -->"

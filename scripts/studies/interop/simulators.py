@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
-from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.errors import NameNotFound, NotConverged
 from softrobots.export.mjcf import to_mjcf
 from softrobots.export.sdf import to_sdf
@@ -13,6 +12,7 @@ from softrobots.export.snippets import to_pybullet
 from studies.interop import bullet_statics, drake_statics, mujoco_statics
 from studies.interop.cases import WELDED, EquilibriumCase
 from studies.interop.outcomes import Outcome, Question
+from studies.interop.tools import find_tool
 
 STATIC_TOLERANCE = 1e-9
 """Largest difference from Pinocchio's coordinates where the forces balance [rad or m]."""
@@ -25,7 +25,7 @@ class Simulator:
     """A simulator with joint springs, its own or as torques."""
 
     name: str
-    """Name in `softrobots.cli.tools.known_tools.TOOLS`."""
+    """Name in `studies.interop.tools.TOOLS`."""
     how: str
     """The exported file, and how it is loaded."""
     simulated: str

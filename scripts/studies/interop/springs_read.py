@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.cli.tools.known_tools import find_tool
 from softrobots.core.checks import FloatArray, choice
+from studies.interop.tools import find_tool
 
 FORMATS: Mapping[str, str] = {"URDF": "urdf", "MJCF": "xml", "SDF": "sdf"}
 """File formats, and the ending by which tools know them."""

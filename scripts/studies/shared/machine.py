@@ -6,7 +6,7 @@ import os
 import platform
 from pathlib import Path
 
-from softrobots.cli.tools.known_tools import installed_version
+from softrobots.cli.tools.packages import installed_version
 
 PACKAGES = ("pin", "numpy", "numba", "scipy", "mujoco", "pin-pink", "daqp")
 """Packages whose versions are recorded."""

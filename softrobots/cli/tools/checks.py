@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pinocchio as pin
 
-from softrobots.cli.tools.kinematics import COUNT, KinematicsRow, as_file, compare_kinematics
+from softrobots.cli.tools.kinematics import COUNT, PRECISION, PlacedLinks, as_file, compare_kinematics
 from softrobots.core.errors import SoftRobotsError
 from softrobots.description.sources import read_source
 from softrobots.description.tag_reader import read_tags
@@ -44,23 +44,24 @@ def check_description(source: Robot | Path | str) -> tuple[Finding, ...]:
 def _kinematics(source: Robot | Path | str) -> Finding:
     """Compare yourdfpy's kinematics of every link with Pinocchio's."""
     try:
-        (row,) = compare_kinematics(source, ["yourdfpy"])
+        row = compare_kinematics(source)
     except SoftRobotsError as error:
         return Finding("yourdfpy's kinematics", (str(error),))
     return Finding("yourdfpy's kinematics", tuple(row_problems(row)), (f"{_row_text(row)} at {COUNT} random configurations",))
 
 
-def _row_text(row: KinematicsRow) -> str:
-    """Return the errors of a tool on one line."""
+def _row_text(row: PlacedLinks) -> str:
+    """Return the errors of yourdfpy on one line."""
     errors = f"within {row.position_error:.1e} m and {row.rotation_error:.1e} rad of Pinocchio"
     return f"{errors}, {row.joints} of {row.joints_in_file} joints, {row.links} of {row.links + len(row.lost_links)} links"
 
 
-def row_problems(row: KinematicsRow) -> list[str]:
-    """Return what is wrong with a comparison; empty if the tool agrees."""
+def row_problems(row: PlacedLinks) -> list[str]:
+    """Return what is wrong with a comparison; empty if yourdfpy agrees."""
     if row.problem:
-        return [f"{row.tool} refuses the file: {row.problem}"]
-    return [] if row.agrees else [f"{row.tool} is {_row_text(row)}; all of them within {row.precision:g} are required"]
+        return [f"yourdfpy refuses the file: {row.problem}"]
+    agrees = row.agrees_within(PRECISION)
+    return [] if agrees else [f"yourdfpy is {_row_text(row)}; all of them within {PRECISION:g} are required"]
 
 
 def _tags(urdf: str, label: str) -> str:

@@ -1,42 +1,91 @@
-"""The kinematics of a URDF file in other tools, against Pinocchio's: where each link is, at random joint coordinates."""
+"""The kinematics of a URDF file in yourdfpy against Pinocchio's: where each link is, at random joint coordinates."""
 
 from __future__ import annotations
 
 import contextlib
 import tempfile
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import pinocchio as pin
 
-from softrobots.cli.tools.known_tools import Tool, find_tool, installed_tools
-from softrobots.cli.tools.placed_links import Poses, open_in
 from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.core.errors import DescriptionError, SoftRobotsError
 from softrobots.core.xml_input import parse_xml, read_xml
+from softrobots.description.rigid_tree_urdf import link_at
 from softrobots.description.sources import read_source
 from softrobots.model.pinocchio_data import MAX_DOF
 from softrobots.robots import Robot
 
 COUNT = 20
 """Random configurations of a comparison."""
+PRECISION = 1e-9
+"""Largest error of a tool that computes in double precision [m and rad]; rounding is below 1e-14 a metre."""
 
 _WIDEST = (2.0 * np.pi, 1.0)
 """Joints with wider limits are drawn within plus and minus these [rad, m]."""
 
+Poses = Mapping[str, FloatArray]
+"""Pose of each link in the world by its name, each (4, 4) [m]."""
+
+
+class LoadedRobot(NamedTuple):
+    """A robot in a tool."""
+
+    joints: tuple[str, ...]
+    """Movable joints that the tool knows and that can be set."""
+    poses: Callable[[Mapping[str, float]], Poses]
+    """Poses of all links that the tool keeps, for coordinates by joint name [rad or m]; other names are ignored."""
+    close: Callable[[], object] = lambda: None
+    """Gives back what the tool holds."""
+
+
+def in_yourdfpy(file: Path) -> LoadedRobot:
+    """Load a URDF file in yourdfpy."""
+    import yourdfpy
+
+    robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_collision_scene_graph=False)
+    names = tuple(robot.actuated_joint_names)
+
+    def poses(values: Mapping[str, float]) -> Poses:
+        robot.update_cfg({name: values[name] for name in names if name in values})
+        return poses_along_tree(file, robot.get_transform)  # from link to link: from the world it is quadratic in their number
+
+    return LoadedRobot((*names, *mimicking(file)), poses)
+
+
+def carriers(file: Path) -> dict[str, ElementTree.Element]:
+    """Return the joint that carries each link of a URDF file, by the name of the link."""
+    return {link_at(joint, "child"): joint for joint in ElementTree.parse(file).getroot().findall("joint")}
+
+
+def mimicking(file: Path) -> tuple[str, ...]:
+    """Return the joints that mimic others; yourdfpy and urchin move them by themselves."""
+    return tuple(joint.get("name", "") for joint in carriers(file).values() if joint.find("mimic") is not None)
+
+
+def poses_along_tree(file: Path, steps: Callable[[str, str], FloatArray]) -> dict[str, FloatArray]:
+    """Return the poses of all links from the pose of each in its parent, `steps(child, parent)`."""
+    joints = carriers(file)
+    poses: dict[str, FloatArray] = {}
+    for link in joints:
+        path = [link]
+        while path[-1] in joints and path[-1] not in poses:
+            path.append(link_at(joints[path[-1]], "parent"))
+        poses.setdefault(path[-1], np.eye(4))
+        for child, parent in zip(path[-2::-1], path[:0:-1], strict=True):
+            poses[child] = poses[parent] @ steps(child, parent)
+    return poses
+
 
 @dataclass(frozen=True)
-class KinematicsRow:
+class PlacedLinks:
     """How a tool places the links of a file."""
 
-    tool: str
-    """Name of the tool."""
-    version: str
-    """Its version."""
     file: str
     """Name of the robot or its file."""
     joints: int
@@ -51,51 +100,44 @@ class KinematicsRow:
     """Largest distance of a link from where Pinocchio has it [m]; 0 if the tool refuses the file."""
     rotation_error: float
     """Largest angle between a link and itself in Pinocchio [rad]; 0 if the tool refuses the file."""
-    precision: float
-    """Largest error that the tool is allowed [m and rad]."""
-    limits: str
-    """What the tool cannot do with a URDF file."""
     problem: str = ""
     """Error of the tool if it refused the file, else empty."""
 
-    @property
-    def agrees(self) -> bool:
-        """Whether every link and joint is there, and every link where Pinocchio has it."""
+    def agrees_within(self, precision: float) -> bool:
+        """Whether every link and joint is there, and every link where Pinocchio has it, up to an error [m and rad]."""
         complete = not self.problem and not self.lost_links and self.joints == self.joints_in_file
-        return complete and max(self.position_error, self.rotation_error) <= self.precision
+        return complete and max(self.position_error, self.rotation_error) <= precision
 
 
 def compare_kinematics(
-    source: Robot | Path | str, tools: Sequence[str] | None = None, *, count: int = COUNT, seed: int = 20210312
-) -> tuple[KinematicsRow, ...]:
-    """Compare where tools place the links of a URDF with where Pinocchio places them.
+    source: Robot | Path | str,
+    load: Callable[[Path], LoadedRobot] = in_yourdfpy,
+    *,
+    count: int = COUNT,
+    seed: int = 20210312,
+) -> PlacedLinks:
+    """Compare where a tool places the links of a URDF with where Pinocchio places them.
 
     Pinocchio reads the file itself, without this package. Joint coordinates are drawn within the limits of
     the file, those of mimicking joints follow.
 
     Args:
         source: What `read_source` takes.
-        tools: Names of tools, of `softrobots.cli.tools.known_tools.TOOLS`; by default all that are installed.
+        load: Loads a file in the tool.
         count: Number of random configurations.
         seed: Seed of the draw.
 
     Returns:
-        A row for each tool.
+        The comparison.
 
     Raises:
-        SoftRobotsError: Whatever `read_source` raises.
+        SoftRobotsError: Whatever `read_source` or `load` raises.
         DescriptionError: If Pinocchio refuses the file, or a joint is not revolute, continuous, prismatic or fixed.
-        NameNotFound: If there is no such tool.
-        MissingDependency: If a tool of `tools` is not installed.
         ParameterError: If `count` is not positive.
     """
     positive_integer("count", count)
-    chosen = [find_tool(name) for name in (installed_tools() if tools is None else tools)]
-    for tool in chosen:
-        tool.load()
     with as_file(source) as (file, label):
-        expected = _pinocchio_poses(file, label, count, seed)
-        return tuple(_compare(tool, file, label, expected) for tool in chosen)
+        return _compare(load, file, label, _pinocchio_poses(file, label, count, seed))
 
 
 @dataclass(frozen=True)
@@ -107,38 +149,25 @@ class _Expected:
     poses: tuple[Poses, ...]
 
 
-def _compare(tool: Tool, file: Path, label: str, expected: _Expected) -> KinematicsRow:
-    facts: dict[str, Any] = {
-        "tool": tool.name,
-        "version": str(tool.version),
-        "file": label,
-        "joints_in_file": len(expected.joints),
-        "precision": tool.precision,
-        "limits": tool.limits,
-    }
+def _compare(load: Callable[[Path], LoadedRobot], file: Path, label: str, expected: _Expected) -> PlacedLinks:
+    links, joints_in_file = tuple(expected.poses[0]), len(expected.joints)
     try:
-        with open_in(tool, file) as robot:
+        robot = load(file)
+        with contextlib.closing(robot):
             placed = [robot.poses(values) for values in expected.values]
     except SoftRobotsError:
         raise
     except Exception as error:  # a tool may raise anything if it refuses a file
-        facts |= {"joints": 0, "links": 0, "lost_links": tuple(expected.poses[0]), "position_error": 0.0, "rotation_error": 0.0}
         problem = f"{type(error).__name__}: {str(error).strip().splitlines()[0] if str(error).strip() else 'no reason given'}"
-        return KinematicsRow(**facts, problem=problem)
-    kept = [link for link in expected.poses[0] if link in placed[0]]
+        return PlacedLinks(label, 0, joints_in_file, 0, links, 0.0, 0.0, problem)
+    kept = [link for link in links if link in placed[0]]
     pairs = [(here[link], there[link]) for here, there in zip(placed, expected.poses, strict=True) for link in kept]
     errors = np.array([pose_error(one, other) for one, other in pairs]).reshape(-1, 2)
     broken = not np.all(np.isfinite(errors))
     position, rotation = (0.0, 0.0) if broken or not len(errors) else errors.max(axis=0).tolist()
-    return KinematicsRow(
-        **facts,
-        joints=len(set(robot.joints) & set(expected.joints)),
-        links=len(kept),
-        lost_links=tuple(link for link in expected.poses[0] if link not in kept),
-        position_error=position,
-        rotation_error=rotation,
-        problem="a pose that is not finite" if broken else "",
-    )
+    lost = tuple(link for link in links if link not in kept)
+    known, problem = len(set(robot.joints) & set(expected.joints)), "a pose that is not finite" if broken else ""
+    return PlacedLinks(label, known, joints_in_file, len(kept), lost, position, rotation, problem)
 
 
 def pose_error(one: FloatArray, other: FloatArray) -> tuple[float, float]:

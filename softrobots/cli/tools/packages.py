@@ -7,7 +7,6 @@ import sys
 from importlib import metadata
 from typing import NamedTuple
 
-from softrobots.cli.tools.known_tools import installed_version
 from softrobots.core.errors import SoftRobotsError
 
 EXTRAS = {
@@ -22,7 +21,7 @@ EXTRAS = {
     "pictures": "pictures of the browser view",
     "robots": "the UR5 and other third-party robots",
     "interop": "simulators; load_model reads MJCF and SDF",
-    "interop-kinematics": "tools to compare kinematics with: softrobots doctor --all",
+    "interop-kinematics": "tools to compare kinematics with: scripts/interoperability.py",
     "cluster": "sweeps on many machines",
     "bench": "rigid inverse kinematics to compare speed with",
     "docs": "the documentation as a site: scripts/build_docs.py",
@@ -83,6 +82,14 @@ def required_packages() -> tuple[Package, ...]:
                 extras = (*(packages[name].extras if name in packages else ()), *([extra] if extra else []))
                 packages[name] = Package(name, minimum, extras, below, installed_version(name))
     return tuple(packages.values())
+
+
+def installed_version(package: str) -> str | None:
+    """Return the version of an installed package, by its name on PyPI; None if it is not installed."""
+    try:
+        return metadata.version(package)
+    except metadata.PackageNotFoundError:
+        return None
 
 
 def missing_of_extras(packages: tuple[Package, ...]) -> dict[str, list[str]]:

@@ -46,7 +46,8 @@ def batch_rows(**arrays: tuple[Any, int]) -> list[FloatArray]:
         rows.append(array)
     if len(set(counts.values())) > 1:
         listed = ", ".join(f"{name} {count}" for name, count in counts.items())
-        raise ParameterError(next(iter(counts)), counts, f"as many rows as the others have ({listed})")
+        name = next(iter(counts))
+        raise ParameterError(name, arrays[name][0], f"of as many rows as the others have ({listed})")
     count = next(iter(counts.values()), 1)
     return [array if array.ndim == 2 else np.tile(array, (count, 1)) for array in rows]
 

@@ -5,9 +5,10 @@ from __future__ import annotations
 import importlib
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib import metadata
 from types import ModuleType
 
+from softrobots.cli.tools.kinematics import PRECISION
+from softrobots.cli.tools.packages import installed_version
 from softrobots.core.errors import MissingDependency, NameNotFound, SoftRobotsError
 
 
@@ -48,22 +49,20 @@ class Tool:
             raise SoftRobotsError(f"{self.package} {self.version or ''} cannot be imported: {error}") from error
 
 
-DOUBLE = 1e-9
-"""Precision of the tools that compute in double precision [m and rad]; rounding is below 1e-14 a metre."""
 SINGLE = 1e-5
 """Precision of the tools with single precision inside [m and rad]."""
 
 _TABLE = (
-    Tool("yourdfpy", "yourdfpy", "yourdfpy", "", DOUBLE, "no mimic of a mimic"),
+    Tool("yourdfpy", "yourdfpy", "yourdfpy", "", PRECISION, "no mimic of a mimic"),
     Tool(
         "MuJoCo",
         "mujoco",
         "mujoco",
         "interop",
-        DOUBLE,
+        PRECISION,
         "reads no joint spring from URDF; no package:// meshes; drops links behind fixed joints unless the file forbids it",
     ),
-    Tool("Drake", "pydrake", "drake", "interop", DOUBLE, "reads no joint spring from URDF; no STL for collision"),
+    Tool("Drake", "pydrake", "drake", "interop", PRECISION, "reads no joint spring from URDF; no STL for collision"),
     Tool(
         "PyBullet",
         "pybullet",
@@ -73,17 +72,17 @@ _TABLE = (
         "at most 122 movable joints, and 127 with the fixed ones; single precision; lines of the file below 8192 characters; "
         "reads no joint spring from URDF; no wheels above Python 3.11",
     ),
-    Tool("urchin", "urchin", "urchin", "interop-kinematics", DOUBLE, "kinematics only; no mimic of a mimic"),
-    Tool("ikpy", "ikpy.chain", "ikpy", "interop-kinematics", DOUBLE, "kinematics only; one serial chain; no mimic"),
+    Tool("urchin", "urchin", "urchin", "interop-kinematics", PRECISION, "kinematics only; no mimic of a mimic"),
+    Tool("ikpy", "ikpy.chain", "ikpy", "interop-kinematics", PRECISION, "kinematics only; one serial chain; no mimic"),
     Tool(
         "roboticstoolbox",
         "roboticstoolbox",
         "roboticstoolbox-python",
         "interop-kinematics",
-        DOUBLE,
+        PRECISION,
         "kinematics only; no mimic; of package:// meshes only those of its own data",
     ),
-    Tool("viser", "viser.extras", "viser", "interop-kinematics", DOUBLE, "shows only; loads through yourdfpy"),
+    Tool("viser", "viser.extras", "viser", "interop-kinematics", PRECISION, "shows only; loads through yourdfpy"),
 )
 
 TOOLS: Mapping[str, Tool] = {tool.name: tool for tool in _TABLE}
@@ -104,11 +103,3 @@ def find_tool(name: str) -> Tool:
 def installed_tools() -> tuple[str, ...]:
     """Names of the tools that are installed, in the order of the table."""
     return tuple(name for name, tool in TOOLS.items() if tool.version is not None)
-
-
-def installed_version(package: str) -> str | None:
-    """Version of an installed package, by its name on PyPI; None if it is not installed."""
-    try:
-        return metadata.version(package)
-    except metadata.PackageNotFoundError:
-        return None

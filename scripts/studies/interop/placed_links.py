@@ -5,86 +5,32 @@ from __future__ import annotations
 import contextlib
 import warnings
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from softrobots.cli.tools.known_tools import Tool
+from softrobots.cli.tools.kinematics import LoadedRobot, Poses, carriers, in_yourdfpy, mimicking, poses_along_tree
 from softrobots.core.checks import FloatArray
-from softrobots.description.rigid_tree_urdf import link_at
-
-Poses = Mapping[str, FloatArray]
-"""Pose of each link in the world by its name, each (4, 4) [m]."""
+from studies.interop.tools import Tool
 
 
-class LoadedRobot(NamedTuple):
-    """A robot in a tool."""
-
-    joints: tuple[str, ...]
-    """Movable joints that the tool knows and that can be set."""
-    poses: Callable[[Mapping[str, float]], Poses]
-    """Poses of all links that the tool keeps, for coordinates by joint name [rad or m]; other names are ignored."""
-    close: Callable[[], object] = lambda: None
-    """Gives back what the tool holds."""
-
-
-@contextlib.contextmanager
-def open_in(tool: Tool, file: Path) -> Iterator[LoadedRobot]:
-    """Load a URDF file in a tool; what the tool holds is given back at the end.
+def open_in(tool: Tool, file: Path) -> LoadedRobot:
+    """Load a URDF file in a tool.
 
     Raises:
         MissingDependency: If the tool is not installed.
         Exception: Whatever it raises if it refuses the file.
     """
-    robot = _ADAPTERS[tool.name](tool.load(), file)
-    try:
-        yield robot
-    finally:
-        robot.close()
-
-
-def _carriers(file: Path) -> dict[str, ElementTree.Element]:
-    """The joint that carries each link of a URDF file, by the name of the link."""
-    return {link_at(joint, "child"): joint for joint in ElementTree.parse(file).getroot().findall("joint")}
-
-
-def _mimicking(file: Path) -> tuple[str, ...]:
-    """Joints that mimic others; yourdfpy and urchin move them by themselves."""
-    return tuple(joint.get("name", "") for joint in _carriers(file).values() if joint.find("mimic") is not None)
-
-
-def _along_the_tree(file: Path, steps: Callable[[str, str], FloatArray]) -> dict[str, FloatArray]:
-    """Poses of all links from the pose of each in its parent, `steps(child, parent)`."""
-    carriers = _carriers(file)
-    poses: dict[str, FloatArray] = {}
-    for link in carriers:
-        path = [link]
-        while path[-1] in carriers and path[-1] not in poses:
-            path.append(link_at(carriers[path[-1]], "parent"))
-        poses.setdefault(path[-1], np.eye(4))
-        for child, parent in zip(path[-2::-1], path[:0:-1], strict=True):
-            poses[child] = poses[parent] @ steps(child, parent)
-    return poses
+    return _ADAPTERS[tool.name](tool.load(), file)
 
 
 def _homogeneous(rotation: Any, translation: Any) -> FloatArray:
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = np.reshape(rotation, (3, 3)), translation
     return pose
-
-
-def _yourdfpy(yourdfpy: Any, file: Path) -> LoadedRobot:
-    robot = yourdfpy.URDF.load(str(file), load_meshes=False, build_collision_scene_graph=False)
-    names = tuple(robot.actuated_joint_names)
-
-    def poses(values: Mapping[str, float]) -> Poses:
-        robot.update_cfg({name: values[name] for name in names if name in values})
-        return _along_the_tree(file, robot.get_transform)  # from link to link: from the world it is quadratic in their number
-
-    return LoadedRobot((*names, *_mimicking(file)), poses)
 
 
 def _urchin(urchin: Any, file: Path) -> LoadedRobot:
@@ -95,7 +41,7 @@ def _urchin(urchin: Any, file: Path) -> LoadedRobot:
         placed = robot.link_fk(cfg={name: values[name] for name in names if name in values}, use_names=True)
         return {str(name): np.asarray(pose) for name, pose in placed.items()}
 
-    return LoadedRobot((*names, *_mimicking(file)), poses)
+    return LoadedRobot((*names, *mimicking(file)), poses)
 
 
 def _viser(extras: Any, file: Path) -> LoadedRobot:
@@ -118,9 +64,9 @@ def _viser(extras: Any, file: Path) -> LoadedRobot:
 
     def poses(values: Mapping[str, float]) -> Poses:
         robot.update_cfg(np.array([values.get(name, 0.0) for name in names]))
-        return _along_the_tree(file, in_parent)
+        return poses_along_tree(file, in_parent)
 
-    return LoadedRobot((*names, *_mimicking(file)), poses)
+    return LoadedRobot((*names, *mimicking(file)), poses)
 
 
 def _mujoco(mujoco: Any, file: Path) -> LoadedRobot:
@@ -187,12 +133,12 @@ def _pybullet(pybullet: Any, file: Path) -> LoadedRobot:
 
 def _ikpy(chains: Any, file: Path) -> LoadedRobot:
     """The first chain from the root to an end: ikpy follows the first joint of the file at a branch."""
-    carriers = _carriers(file)
-    root = next(link.get("name", "") for link in ElementTree.parse(file).iter("link") if link.get("name") not in carriers)
+    carrier_of = carriers(file)
+    root = next(link.get("name", "") for link in ElementTree.parse(file).iter("link") if link.get("name") not in carrier_of)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", message="Link .* is of type 'fixed'")  # a hint for inverse kinematics
         chain = chains.Chain.from_urdf_file(str(file), base_elements=[root])
-    link_of = {joint.get("name", ""): link for link, joint in carriers.items()}
+    link_of = {joint.get("name", ""): link for link, joint in carrier_of.items()}
     names = [link.name for link in chain.links[1:]]  # the first is the root; its links are the joints of the file
 
     def poses(values: Mapping[str, float]) -> Poses:
@@ -208,8 +154,8 @@ def _roboticstoolbox(roboticstoolbox: Any, file: Path) -> LoadedRobot:
 
     links, name, _ = URDF_read(file.resolve())
     robot = roboticstoolbox.Robot(links, name=name)
-    carriers = _carriers(file)
-    joints = {carriers[link.name].get("name", ""): link.jindex for link in robot.links if link.isjoint}
+    carrier_of = carriers(file)
+    joints = {carrier_of[link.name].get("name", ""): link.jindex for link in robot.links if link.isjoint}
 
     def poses(values: Mapping[str, float]) -> Poses:
         q = np.zeros(robot.n)
@@ -222,7 +168,7 @@ def _roboticstoolbox(roboticstoolbox: Any, file: Path) -> LoadedRobot:
 
 
 _ADAPTERS: Mapping[str, Callable[[Any, Path], LoadedRobot]] = {
-    "yourdfpy": _yourdfpy,
+    "yourdfpy": lambda _, file: in_yourdfpy(file),
     "MuJoCo": _mujoco,
     "Drake": _drake,
     "PyBullet": _pybullet,
