@@ -20,8 +20,9 @@ from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import non_negative_number, positive_integer, positive_number
 from softrobots.core.files import make_folder
 from softrobots.core.summary import aligned
-from softrobots.view.figures import canvas, contacts, picture
+from softrobots.view.figures import canvas, picture
 from studies.contact import examples, pictures
+from studies.contact.force_picture import contact_forces
 from studies.shared.command_line import serve, tell_written
 from studies.shared.folders import free_folder
 
@@ -162,7 +163,7 @@ def run(arguments: argparse.Namespace) -> Path:
 def _figures(name: str, path: sr.ContactPath) -> dict[str, Any]:
     """The pictures of a path."""
     figures = {
-        "forces": contacts.contact_forces(path, parameter=TOUCHES[name].parameter),
+        "forces": contact_forces(path, parameter=TOUCHES[name].parameter),
         "shape": picture.plot(path.equilibria[-1]),
     }
     if name == "brace":

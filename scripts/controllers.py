@@ -15,8 +15,8 @@ import sys
 from pathlib import Path
 
 from softrobots.cli.options.command_line import exit_status
-from softrobots.view.figures import canvas, shapers
-from studies.control import report, shaping, tracking
+from softrobots.view.figures import canvas
+from studies.control import report, shaper_picture, shaping, tracking
 from studies.shared.checkout import CHECKOUT
 from studies.shared.recorded_run import check_page, write_record
 
@@ -43,7 +43,7 @@ def main(argv: list[str] | None = None) -> int:
         if arguments.docs is None:
             return
         images = arguments.docs / "docs" / "images"
-        canvas.write_png(shapers.sensitivity(3.5, 0.06), images / "shaper_sensitivity.png", overwrite=True)
+        canvas.write_png(shaper_picture.sensitivity(3.5, 0.06), images / "shaper_sensitivity.png", overwrite=True)
         canvas.write_png(report.tracking_figure(followed), images / "controllers.png", overwrite=True)
         for name, result in zip(names, (shaped, rows), strict=True):
             command = "python scripts/controllers.py"

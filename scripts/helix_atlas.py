@@ -21,8 +21,9 @@ from softrobots import helix
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import positive_number
 from softrobots.core.files import csv_text, make_folder, write_text
-from softrobots.helix import atlas
-from softrobots.view.figures import canvas, helices
+from softrobots.view.figures import canvas
+from studies.papers import helices, helix_grid
+from studies.papers.grasp_picture import grasp
 from studies.shared.folders import free_folder
 
 DOCS = Path(__file__).resolve().parent.parent / "docs" / "images"
@@ -34,15 +35,15 @@ def parser() -> argparse.ArgumentParser:
     """Build the command line."""
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     test = helix.PAPER_CYLINDER
-    angles = [float(f"{degrees:.12g}") for degrees in np.degrees(atlas.PAPER_ANGLES)]
+    angles = [float(f"{degrees:.12g}") for degrees in np.degrees(helix_grid.PAPER_ANGLES)]
 
     def numbers(option: str, default: Sequence[float], help_text: str) -> None:
         shown = " ".join(f"{number:g}" for number in default)
         options.add_argument(option, type=float, nargs="+", metavar="X", default=list(default), help=f"{help_text} ({shown})")
 
     numbers("--angles", angles, "of the actuator to the axis of the tube, up to three [degrees]")
-    numbers("--contractions", atlas.PAPER_CONTRACTIONS[::-1], "contracted over original length of the actuator, in (0, 1]")
-    options.add_argument("--diameter", type=float, default=atlas.PAPER_DIAMETER, help="of the tube [m] (%(default)s)")
+    numbers("--contractions", helix_grid.PAPER_CONTRACTIONS[::-1], "contracted over original length of the actuator, in (0, 1]")
+    options.add_argument("--diameter", type=float, default=helix_grid.PAPER_DIAMETER, help="of the tube [m] (%(default)s)")
     options.add_argument("--length", type=float, default=1.0, help="of the uninflated tubes in the picture [m] (%(default)s)")
     numbers("--deflections", test.deflections, "radius of the grasped object minus the natural inner radius of the helix [m]")
     options.add_argument("--pressure", type=float, default=10e3, help="largest gauge pressure of the grasp [Pa] (%(default)g)")
@@ -75,8 +76,8 @@ def run(arguments: argparse.Namespace) -> None:
     forces = force_table(test, pressure)
     figures: list[Any] = []
     if not arguments.no_plots:  # the quick ones first, so that errors appear at once
-        lines, grasp = helices.radius_and_pitch(angles, arguments.diameter), helices.grasp(test, pressure)
-        figures = [helices.grid(arguments.contractions, angles, arguments.diameter, arguments.length), lines, grasp]
+        lines, forces_of = helices.radius_and_pitch(angles, arguments.diameter), grasp(test, pressure)
+        figures = [helices.grid(arguments.contractions, angles, arguments.diameter, arguments.length), lines, forces_of]
     make_folder(folder)
     if arguments.docs is not None:
         for name, figure in zip(PICTURES[:2], figures, strict=False):
@@ -99,12 +100,12 @@ def run(arguments: argparse.Namespace) -> None:
     print(f"written to {folder}: {', '.join(sorted(p.name for p in folder.iterdir()))}")
 
 
-def shape_table(contractions: Sequence[float], angles: Any, diameter: float) -> helix.ShapeTable:
+def shape_table(contractions: Sequence[float], angles: Any, diameter: float) -> helix_grid.ShapeTable:
     """Helices of the grid; for the grid of the paper also its helix in two sizes."""
-    same_angles = np.array_equal(np.round(angles, 12), np.round(atlas.PAPER_ANGLES, 12))
-    if same_angles and diameter == atlas.PAPER_DIAMETER and sorted(contractions) == sorted(atlas.PAPER_CONTRACTIONS):
-        return helix.paper_grid()
-    return helix.shape_table(contractions, np.asarray(angles)[:, None], diameter)
+    same_angles = np.array_equal(np.round(angles, 12), np.round(helix_grid.PAPER_ANGLES, 12))
+    if same_angles and diameter == helix_grid.PAPER_DIAMETER and sorted(contractions) == sorted(helix_grid.PAPER_CONTRACTIONS):
+        return helix_grid.paper_grid()
+    return helix_grid.shape_table(contractions, np.asarray(angles)[:, None], diameter)
 
 
 SHAPE_COLUMNS = (
@@ -127,7 +128,7 @@ def force_table(test: helix.GraspTest, pressure: float) -> list[tuple[float, ...
     return list(zip(*(column.ravel().tolist() for column in columns), strict=True))
 
 
-def cells_of(row: atlas.ShapeRow) -> list[str]:
+def cells_of(row: helix_grid.ShapeRow) -> list[str]:
     """Return the cells of a helix for `SHAPE_COLUMNS`, rounded."""
     lengths = [f"{length:.5f}" for length in (row.diameter, row.outer_radius, row.inner_radius, row.pitch)]
     distance = "none" if row.turn_distance is None else f"{row.turn_distance:.5f}"

@@ -25,6 +25,7 @@ from softrobots.core.files import make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import METHODS
 from softrobots.view.figures import canvas, trajectories
+from studies.papers import trajectory_pictures
 from studies.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
 from studies.shared.command_line import serve, tell_written
 from studies.shared.folders import free_folder
@@ -237,12 +238,12 @@ def _figures(
     turns = {}
     if trajectory.orientation_error is not None and uncompensated.orientation_error is not None:
         angles = dict(zip(errors, (trajectory.orientation_error, uncompensated.orientation_error), strict=True))
-        turns["orientation_errors"] = trajectories.tip_errors(angles, trajectory.times, angles=True)
+        turns["orientation_errors"] = trajectory_pictures.tip_errors(angles, trajectory.times, angles=True)
     return turns | {
         "poses": trajectories.poses(trajectory),
-        "motor_angles": trajectories.motor_angles(trajectory, rigid),
-        "tip_errors": trajectories.tip_errors(errors, trajectory.times),
-        "link_moments": trajectories.link_moments(trajectory),
+        "motor_angles": trajectory_pictures.motor_angles(trajectory, rigid),
+        "tip_errors": trajectory_pictures.tip_errors(errors, trajectory.times),
+        "link_moments": trajectory_pictures.link_moments(trajectory),
     }
 
 

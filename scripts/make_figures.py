@@ -24,6 +24,7 @@ from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
 from softrobots.view.browser import take_picture
 from softrobots.view.figures import canvas, equilibria, inflated_link, vibrations
 from studies.contact.pictures import contact_grip, contact_margins, contact_peg_forces
+from studies.gallery import load_plots
 from studies.gallery.actuator_plots import actuator_kinds, dry_friction
 from studies.gallery.your_robot import (
     your_robot_ellipses,
@@ -34,6 +35,7 @@ from studies.gallery.your_robot import (
     your_robot_values,
 )
 from studies.motion.pictures import motion_energies, motion_gust, motion_release, motion_tip, motion_turn
+from studies.papers import link_pictures
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 EXAMPLES = DOCS / "examples"
@@ -45,13 +47,13 @@ PUSH = (-1.0, 0.0, 0.0)
 
 def link_deflection() -> Any:
     """Deflection along the link of the paper under 10 N at its end."""
-    return inflated_link.deflection(10.0, stiffness=MEAN_STIFFNESS, hinge_offset=0.03, pressure=50e3, **LINK)
+    return link_pictures.deflection(10.0, stiffness=MEAN_STIFFNESS, hinge_offset=0.03, pressure=50e3, **LINK)
 
 
 def link_pressure() -> Any:
     """Stiffness and largest moment over pressure, the paper's Table 3 beside its equations."""
     modulus = inflated_beam.young_modulus_from_stiffness(MEAN_STIFFNESS, pressure=30e3, **LINK)
-    return inflated_link.pressure_effects(TABLE_3, young_modulus=modulus, **LINK)
+    return link_pictures.pressure_effects(TABLE_3, young_modulus=modulus, **LINK)
 
 
 def bending_test() -> Any:
@@ -106,7 +108,7 @@ def arm_buckling() -> Any:
     for sideways in (0.0, 0.1, 1.0):
         label = f"pushed with {sideways:g} N sideways" if sideways else "pushed exactly along the axis"
         branches[label] = [sr.solve_equilibrium(arm, (0, 0, 0), (-force, sideways, 0)) for force in forces]
-    return equilibria.growing_load(branches, PUSH, critical=critical)
+    return load_plots.growing_load(branches, PUSH, critical=critical)
 
 
 def arm_branches() -> Any:
@@ -127,7 +129,7 @@ def link_reaction() -> Any:
             held = sr.solve_imposed_displacement(link, (0, 0), way, start=held, **probe)
             run.append(held)
         runs[f"{row.pressure / 1e3:g} kPa"] = run
-    return equilibria.reaction(runs)
+    return load_plots.reaction(runs)
 
 
 def vibration_modes() -> Any:

@@ -22,9 +22,10 @@ from softrobots.view.appearance import (
     TAIL_COLOUR,
     TUBE_COLOUR,
 )
-from softrobots.view.figures import canvas, helix_sheet, trajectories, workspaces
+from softrobots.view.figures import canvas, workspaces
 from softrobots.view.scene import WRINKLING_COLOURS
 from softrobots.view.tension_scale import tension_colour
+from studies.papers import helix_sheet, trajectory_pictures
 from tests.conftest import CHECKOUT
 
 # G. M. Machado, M. M. Oliveira, L. A. F. Fernandes, A physiologically-based model for simulation of color vision deficiency,
@@ -133,7 +134,7 @@ def test_lines_that_look_alike_in_grey_differ_in_style_and_marker() -> None:
 def test_lines_are_drawn_in_these_styles() -> None:
     """Read back from figures: no two lines of one plot share colour, style and marker."""
     times = np.linspace(0.0, 1.0, 30)
-    figure = trajectories.tip_errors({f"method {number}": np.full(30, 10.0**-number) for number in range(6)}, times)
+    figure = trajectory_pictures.tip_errors({f"method {number}": np.full(30, 10.0**-number) for number in range(6)}, times)
     drawn = {(line.get_color(), str(line.get_linestyle()), line.get_marker()) for line in figure.axes[0].lines}
     assert len(drawn) == 6
     assert len({marker for _, _, marker in drawn}) == 6

@@ -21,11 +21,12 @@ import pytest
 
 import softrobots as sr
 from softrobots.export import FORMATS, export_model
-from softrobots.view.figures import canvas, trajectories
+from softrobots.view.figures import canvas
 from softrobots.view.legend import LegendEntry
 from softrobots.view.local_requests import is_local
 from softrobots.view.meshcat_page.page_text import legend_rows
 from softrobots.view.viewer import Viewer, view
+from studies.papers import trajectory_pictures
 from tests.conftest import CHECKOUT, PATIENCE, load_script
 from tests.support.pictures import listening
 
@@ -165,7 +166,7 @@ def test_names_are_no_formulas_in_figures(name: str, tool: Callable[[str], Any])
     model = robot(name)
     held = sr.solve_equilibrium(model, (0.3,), (1.0, 2.0, -3.0))
     path = sr.Trajectory(np.array([0.0, 1.0]), np.array([held.tip_position] * 2), (held, held), "newton")
-    for figure in (sr.plot(held), trajectories.motor_angles(path, path)):
+    for figure in (sr.plot(held), trajectory_pictures.motor_angles(path, path)):
         figure.draw_without_rendering()  # where formulas are read
 
 

@@ -23,7 +23,8 @@ import softrobots as sr
 from softrobots.cli.main import main
 from softrobots.core.checkpoint import Checkpoint
 from softrobots.core.files import make_folder, new_file, write_atomically, write_bytes, write_text
-from softrobots.view.figures import canvas, trajectories
+from softrobots.view.figures import canvas
+from studies.papers import trajectory_pictures
 from studies.shared.folders import free_folder
 from tests.conftest import CHECKOUT, missing
 from tests.support.scripts import run_script
@@ -60,7 +61,7 @@ def _viewer(arm: sr.SoftModel, file: Path) -> object:
 
 
 def _picture(path: sr.Trajectory, file: Path) -> object:
-    return canvas.write_png(trajectories.tip_errors({"way": path.tip_error}, path.times), file, overwrite=True)
+    return canvas.write_png(trajectory_pictures.tip_errors({"way": path.tip_error}, path.times), file, overwrite=True)
 
 
 WRITERS: dict[str, Callable[[sr.Trajectory, Path], object]] = {

@@ -15,7 +15,8 @@ import pytest
 import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.inflated_beam import TABLE_3, CharacterisationRow
-from softrobots.view.figures import equilibria, inflated_link
+from studies.gallery import load_plots
+from studies.papers import link_pictures
 from tests.conftest import CHECKOUT
 from tests.support.figures import READABLE, smallest_text
 from tests.support.tables import each_row
@@ -48,7 +49,7 @@ def check_axes(figure: Any) -> None:
 
 def test_the_bent_link_ends_where_closed_forms_say() -> None:
     """Bending F l^3 / 3, the printed sign twice that, shear F l / (P + j G S), the hinge F l2^2 / k."""
-    figure = inflated_link.deflection(10.0, stiffness=172.71, hinge_offset=0.03, pressure=50e3, **TUBE)
+    figure = link_pictures.deflection(10.0, stiffness=172.71, hinge_offset=0.03, pressure=50e3, **TUBE)
     check_axes(figure)
     modulus = inflated_beam.young_modulus_from_stiffness(172.71, pressure=50e3, **TUBE)
     cap, wall, second = 50e3 * math.pi * 0.055**2, 2 * math.pi * 0.055 * 0.0005, math.pi * 0.055**3 * 0.0005
@@ -60,7 +61,7 @@ def test_the_bent_link_ends_where_closed_forms_say() -> None:
 
 
 def test_laws_have_their_slope_their_plateau_and_their_wrinkling_moment() -> None:
-    figure = inflated_link.moment_angle_laws(TABLE_3, 0.055)
+    figure = link_pictures.moment_angle_laws(TABLE_3, 0.055)
     check_axes(figure)
     drawn = lines(figure.axes[0])
     for row in TABLE_3:
@@ -73,7 +74,7 @@ def test_laws_have_their_slope_their_plateau_and_their_wrinkling_moment() -> Non
 
 
 def test_measured_plateaus_lie_between_wrinkling_and_the_upper_bound() -> None:
-    figure = inflated_link.pressure_effects(TABLE_3, young_modulus=138e6, **TUBE)
+    figure = link_pictures.pressure_effects(TABLE_3, young_modulus=138e6, **TUBE)
     check_axes(figure)
     left, right = (lines(axes) for axes in figure.axes)
     labels = ("upper bound, pi p r^3", "largest moment, measured", "wrinkling moment (3)")
@@ -99,7 +100,7 @@ def pushed() -> dict[str, list[sr.Equilibrium]]:
 
 def test_the_straight_arm_loses_its_stiffness_in_proportion(pushed: dict[str, list[sr.Equilibrium]]) -> None:
     """k - F ((a + c)/2 + sqrt((a - c)^2/4 + c^2)), with the levers a and c of the two hinges."""
-    figure = equilibria.growing_load(pushed, (-2, 0, 0), critical=114.0657)
+    figure = load_plots.growing_load(pushed, (-2, 0, 0), critical=114.0657)
     check_axes(figure)
     left, right = (lines(axes) for axes in figure.axes)
     slope = (1.17 + 0.57) / 2 + math.hypot((1.17 - 0.57) / 2, 0.57)
@@ -121,7 +122,7 @@ def test_markers_tell_what_only_the_probe_holds() -> None:
             link, (0, 0), way, direction=(0, 1, 0), frame="link_1", point=(0.47, 0, 0), along=(1, 0, 0), start=held
         )
         run.append(held)
-    figure = equilibria.reaction({"10 kPa": run})
+    figure = load_plots.reaction({"10 kPa": run})
     check_axes(figure)
     test = inflated_beam.BendingTest()
     angles = [float(test.angle(way)) for way in ways]
@@ -135,18 +136,18 @@ def test_markers_tell_what_only_the_probe_holds() -> None:
 @each_row(
     ("make", "name"),
     [
-        (lambda: inflated_link.deflection(10.0, stiffness=172.71, hinge_offset=0.6, pressure=50e3, **TUBE), "hinge_offset"),
-        (lambda: inflated_link.deflection(math.nan, stiffness=172.71, hinge_offset=0.03, pressure=50e3, **TUBE), "force"),
-        (lambda: inflated_link.moment_angle_laws((), 0.055), "rows"),
-        (lambda: inflated_link.moment_angle_laws("10", 0.055), "rows"),
-        (lambda: inflated_link.moment_angle_laws([(10e3, 180.0)], 0.055), "rows"),  # type: ignore[list-item]
-        (lambda: inflated_link.moment_angle_laws([CharacterisationRow(1e4, -1.0, 0.0, None)], 0.055), "stiffness"),
-        (lambda: inflated_link.moment_angle_laws([CharacterisationRow(1e4, 170.0, 0.0, 0.0)], 0.055), "max_moment"),
-        (lambda: inflated_link.moment_angle_laws(TABLE_3, 0.0), "radius"),
-        (lambda: inflated_link.pressure_effects(TABLE_3, young_modulus=0.0, **TUBE), "young_modulus"),
-        (lambda: equilibria.growing_load({}, (1, 0, 0)), "lines"),
-        (lambda: equilibria.growing_load({"a": []}, (1, 0, 0)), "lines"),
-        (lambda: equilibria.reaction({"a": [1]}), "lines"),  # type: ignore[list-item]
+        (lambda: link_pictures.deflection(10.0, stiffness=172.71, hinge_offset=0.6, pressure=50e3, **TUBE), "hinge_offset"),
+        (lambda: link_pictures.deflection(math.nan, stiffness=172.71, hinge_offset=0.03, pressure=50e3, **TUBE), "force"),
+        (lambda: link_pictures.moment_angle_laws((), 0.055), "rows"),
+        (lambda: link_pictures.moment_angle_laws("10", 0.055), "rows"),
+        (lambda: link_pictures.moment_angle_laws([(10e3, 180.0)], 0.055), "rows"),  # type: ignore[list-item]
+        (lambda: link_pictures.moment_angle_laws([CharacterisationRow(1e4, -1.0, 0.0, None)], 0.055), "stiffness"),
+        (lambda: link_pictures.moment_angle_laws([CharacterisationRow(1e4, 170.0, 0.0, 0.0)], 0.055), "max_moment"),
+        (lambda: link_pictures.moment_angle_laws(TABLE_3, 0.0), "radius"),
+        (lambda: link_pictures.pressure_effects(TABLE_3, young_modulus=0.0, **TUBE), "young_modulus"),
+        (lambda: load_plots.growing_load({}, (1, 0, 0)), "lines"),
+        (lambda: load_plots.growing_load({"a": []}, (1, 0, 0)), "lines"),
+        (lambda: load_plots.reaction({"a": [1]}), "lines"),  # type: ignore[list-item]
     ],
 )
 def test_what_cannot_be_drawn_is_refused(make: Any, name: str) -> None:
@@ -156,12 +157,12 @@ def test_what_cannot_be_drawn_is_refused(make: Any, name: str) -> None:
 
 def test_directions_critical_loads_and_rigid_robots_are_refused(pushed: dict[str, list[sr.Equilibrium]]) -> None:
     with pytest.raises(sr.ParameterError, match="direction"):
-        equilibria.growing_load(pushed, (0, 0, 0))
+        load_plots.growing_load(pushed, (0, 0, 0))
     with pytest.raises(sr.ParameterError, match="critical"):
-        equilibria.growing_load(pushed, (1, 0, 0), critical=-1.0)
+        load_plots.growing_load(pushed, (1, 0, 0), critical=-1.0)
     rigid = sr.solve_equilibrium(sr.load_model(sr.InflatableArm(), springs={}), np.zeros(7))
     with pytest.raises(sr.ParameterError, match="springs"):
-        equilibria.growing_load({"rigid": [rigid]}, (1, 0, 0))
+        load_plots.growing_load({"rigid": [rigid]}, (1, 0, 0))
 
 
 def test_the_script_makes_what_is_asked_for(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -42,9 +42,6 @@ def test_a_linear_table_lies_on_the_chords(shares: tuple[float, ...]) -> None:
         between = (1.0 - share) * PRESSURES[i] + share * PRESSURES[i + 1]
         expected = (1.0 - share) * shares[i] + share * shares[i + 1]
         np.testing.assert_allclose(table.contraction_at(between), expected, rtol=0.0, atol=5e-16)  # a few roundings
-        slope = (shares[i + 1] - shares[i]) / (PRESSURES[i + 1] - PRESSURES[i])
-        np.testing.assert_allclose(table.slope_at(between[:-1]), slope, rtol=1e-14)  # at a row: the slope above it
-    assert table.slope_at(60e3) == pytest.approx(slope, rel=1e-14)  # nothing is above the last row
 
 
 @pytest.mark.parametrize("shares", [LENGTHENING, CONTRACTING])
@@ -83,7 +80,7 @@ def test_any_table_is_monotone_and_inverted(steps: list[tuple[float, float]], fa
 
 def test_the_helix_at_a_pressure() -> None:
     table = ActuatorTable([0.0, 50e3], [0.61, 0.71])
-    shape = table.shape_at([25e3, 50e3], np.radians(5.0), 0.0331)
+    shape = helix.forward(table.contraction_at([25e3, 50e3]), np.radians(5.0), 0.0331)
     # docs/theory.md 3: the reference helix at contraction 0.66
     assert shape.outer_radius[0] == pytest.approx(0.0854078008, abs=1e-10)
     assert shape.inner_radius[0] == pytest.approx(0.0523078008, abs=1e-10)
@@ -96,7 +93,7 @@ def test_shapes_follow_the_argument() -> None:
     table = ActuatorTable(PRESSURES, LENGTHENING)
     assert table.contraction_at(5e3).shape == ()
     assert table.pressure_for(np.full((2, 3), 0.6)).shape == (2, 3)
-    assert table.slope_at([]).shape == (0,)
+    assert table.contraction_at([]).shape == (0,)
 
 
 def test_a_table_is_frozen() -> None:
@@ -189,12 +186,11 @@ def test_a_file_that_cannot_be_read_says_so(tmp_path: Path) -> None:
     [
         ("contraction_at", 60e3 + 1e-6, "pressure", "0.0 to 60000.0"),
         ("contraction_at", [1e3, -1e-6], "pressure", "0.0 to 60000.0"),
-        ("slope_at", 61e3, "pressure", "0.0 to 60000.0"),
         ("pressure_for", 0.4999, "contraction", "0.5 to 0.86"),
         ("pressure_for", [0.6, 0.8601], "contraction", "0.5 to 0.86"),
         ("contraction_at", float("nan"), "pressure", "finite"),
         ("pressure_for", float("inf"), "contraction", "finite"),
-        ("slope_at", "low", "pressure", "finite"),
+        ("contraction_at", "low", "pressure", "finite"),
     ],
 )
 def test_beyond_the_table_nothing_is_said(kind: str, method: str, value: object, field: str, named: str) -> None:
@@ -243,4 +239,4 @@ def test_bad_paths_and_interpolations_are_refused(tmp_path: Path) -> None:
 
 def test_a_straight_tube_has_no_helix() -> None:
     with pytest.raises(StraightTube):
-        ActuatorTable(PRESSURES, CONTRACTING).shape_at(0.0, 0.0, 0.0331)
+        helix.forward(ActuatorTable(PRESSURES, CONTRACTING).contraction_at(0.0), 0.0, 0.0331)

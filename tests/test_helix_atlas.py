@@ -15,8 +15,9 @@ import pytest
 
 from softrobots import helix
 from softrobots.core.errors import ParameterError, StraightTube
-from softrobots.view.figures import helices
-from softrobots.view.figures.helix_sheet import draw
+from studies.papers import helices
+from studies.papers.grasp_picture import grasp
+from studies.papers.helix_sheet import draw
 from tests.conftest import missing
 from tests.support.figures import READABLE, smallest_text
 from tests.support.scripts import run_script
@@ -176,7 +177,7 @@ def test_a_folder_that_is_not_empty_is_refused(folder: Path, tmp_path: Path, cap
         (["--pressure", "-1"], "pressure"),
         (["--object-radius", "0"], "object_radius"),
         (["--deflections", "0.02"], "deflection"),
-        (["--deflections", *["0.001"] * 7], "at most 6 numbers"),
+        (["--deflections", *["0.001"] * 7], "from one to 6 numbers"),
         (["--rise", "0.01"], "turn_height"),
         (["--turns", "0"], "turns"),
         (["--docs"], "given without --output"),
@@ -301,7 +302,7 @@ def _as_arrays(line: Any) -> Any:
 
 
 def test_grasp_says_that_it_is_a_model() -> None:
-    figure = helices.grasp()
+    figure = grasp()
     left, right = figure.axes
     assert "our model, not data of the paper" in figure.get_suptitle()
     forces = [line for line in left.lines if str(line.get_label()).startswith("force")]
@@ -340,13 +341,13 @@ NAN = float("nan")
         (lambda: helices.radius_and_pitch([0.8], D), "angles"),
         (lambda: helices.radius_and_pitch([0.1, 0.2, 0.3, 0.4], D), "angles"),
         (lambda: helices.radius_and_pitch([0.1], -D), "diameter"),
-        (lambda: helices.grasp((0.02, 0.08, 1.5, (0.0,), D)), "test"),
-        (lambda: helices.grasp(pressure=0.0), "pressure"),
-        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(deflections=())), "deflections"),
-        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(deflections=(0.001,) * 7)), "deflections"),
-        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(deflections=(0.02,))), "deflection"),
-        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(diameter="thick")), "diameter"),
-        (lambda: helices.grasp(helix.PAPER_CYLINDER._replace(object_radius=NAN)), "object_radius"),
+        (lambda: grasp((0.02, 0.08, 1.5, (0.0,), D)), "test"),
+        (lambda: grasp(pressure=0.0), "pressure"),
+        (lambda: grasp(helix.PAPER_CYLINDER._replace(deflections=())), "deflections"),
+        (lambda: grasp(helix.PAPER_CYLINDER._replace(deflections=(0.001,) * 7)), "deflections"),
+        (lambda: grasp(helix.PAPER_CYLINDER._replace(deflections=(0.02,))), "deflection"),
+        (lambda: grasp(helix.PAPER_CYLINDER._replace(diameter="thick")), "diameter"),
+        (lambda: grasp(helix.PAPER_CYLINDER._replace(object_radius=NAN)), "object_radius"),
     ],
 )
 def test_figures_refuse_bad_input(call: Callable[[], Any], field: str) -> None:

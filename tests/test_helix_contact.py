@@ -20,6 +20,7 @@ from scipy.spatial.distance import cdist
 
 from softrobots import ParameterError, SoftRobotsError, helix
 from softrobots.core.errors import OutputExists, SelfIntersection
+from studies.papers import helix_grid
 from tests.support.laws import law
 from tests.support.tables import each_row
 
@@ -494,7 +495,7 @@ def test_bad_diameters_are_refused(diameter: Any) -> None:
 
 
 def test_the_papers_grid_is_realisable_and_follows_equation_12() -> None:
-    rows = helix.paper_grid().rows
+    rows = helix_grid.paper_grid().rows
     actuators = [(round(math.degrees(row.angle), 12), row.contraction) for row in rows]
     shares = (0.5, 0.6, 0.7, 0.8, 0.9)
     assert actuators == [(degrees, share) for degrees in (2.5, 5.0, 10.0) for share in shares] + [(5.0, 0.66)] * 2
@@ -510,7 +511,7 @@ def test_the_papers_grid_is_realisable_and_follows_equation_12() -> None:
 
 
 def test_the_grid_tells_where_there_are_neighbouring_turns() -> None:
-    for row in helix.paper_grid().rows:
+    for row in helix_grid.paper_grid().rows:
         radius, pitch = centre_line(row.contraction, row.angle)
         extremes = first_extremes(row.diameter * radius, row.diameter * pitch)
         assert (row.turn_distance is None) == (extremes is None)
@@ -519,7 +520,7 @@ def test_the_grid_tells_where_there_are_neighbouring_turns() -> None:
 
 
 def test_the_larger_tube_is_the_reference_two_and_a_half_times() -> None:
-    one, large = helix.paper_grid().rows[-2:]
+    one, large = helix_grid.paper_grid().rows[-2:]
     reference = (0.0854078008, 0.0523078008, 0.0279647090)  # docs/theory.md 3
     assert (one.outer_radius, one.inner_radius, one.pitch) == pytest.approx(reference, abs=5e-11)
     scaled = tuple(2.5 * size for size in reference)
@@ -527,22 +528,22 @@ def test_the_larger_tube_is_the_reference_two_and_a_half_times() -> None:
 
 
 def test_a_table_says_what_cannot_be_built() -> None:
-    table = helix.shape_table([0.3, 0.3725, 0.38], math.radians(5.0), DIAMETER)
+    table = helix_grid.shape_table([0.3, 0.3725, 0.38], math.radians(5.0), DIAMETER)
     assert [row.realisable for row in table.rows] == [False, False, True]
     assert [row.realisable_by_simple_rule for row in table.rows] == [False, True, True]  # between the two limits
-    assert helix.shape_table([], 0.1, DIAMETER).rows == ()
+    assert helix_grid.shape_table([], 0.1, DIAMETER).rows == ()
 
 
 def test_nothing_is_overwritten_unasked(tmp_path: Path) -> None:
     target = tmp_path / "grid.csv"
     target.write_text("mine")
     with pytest.raises(OutputExists):
-        helix.paper_grid().write_csv(target)
+        helix_grid.paper_grid().write_csv(target)
     assert target.read_text() == "mine"
-    helix.paper_grid().write_csv(target, overwrite=True)
+    helix_grid.paper_grid().write_csv(target, overwrite=True)
     assert target.read_text().startswith("angle [rad]")
     with pytest.raises(ParameterError, match="path"):
-        helix.paper_grid().write_csv(3)  # type: ignore[arg-type]
+        helix_grid.paper_grid().write_csv(3)  # type: ignore[arg-type]
 
 
 def test_the_words_on_a_tube_hold_its_numbers() -> None:

@@ -18,8 +18,7 @@ import softrobots as sr
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.statics.kinematics import frame_placement
-from softrobots.view.figures import shapers
-from studies.control import shaping
+from studies.control import shaper_picture, shaping
 from studies.motion.examples import swing
 from tests.conftest import CHECKOUT
 from tests.support.laws import law
@@ -198,13 +197,13 @@ def test_what_cannot_be_shaped_is_refused(call: Any, name: str) -> None:
 
 
 def test_the_sensitivity_is_drawn() -> None:
-    figure = shapers.sensitivity(3.5, 0.05)
+    figure = shaper_picture.sensitivity(3.5, 0.05)
     lines = {line.get_label().split(",")[0]: line.get_data() for line in figure.axes[0].lines[:3]}
     assert list(lines) == ["ZV", "ZVD", "EI"]
     drawn = {name: float(np.interp(3.5, *data)) for name, data in lines.items()}
     assert drawn == pytest.approx({"ZV": 0.0, "ZVD": 0.0, "EI": 5.0}, abs=1e-9)
     with pytest.raises(sr.ParameterError, match=r"^frequency "):
-        shapers.sensitivity(0.0)
+        shaper_picture.sensitivity(0.0)
 
 
 def test_a_shaped_move_of_the_arm_leaves_less_than_two_per_cent_of_the_vibration() -> None:

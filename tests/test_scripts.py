@@ -206,33 +206,34 @@ def test_make_pictures_photographs_the_arm(tmp_path: Path, capsys: pytest.Captur
 def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
     """Lines, axis labels with units, legends: read back from the figures."""
     from softrobots.view.figures import trajectories
+    from studies.papers import trajectory_pictures
 
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 12)
     loaded = sr.follow_trajectory(arm, path.positions, (0, 10, -15), times=path.times, elbow="up")
     rigid = sr.follow_trajectory(arm, path.positions, times=path.times, elbow="up")
-    angles = trajectories.motor_angles(loaded, rigid).axes[0]
+    angles = trajectory_pictures.motor_angles(loaded, rigid).axes[0]
     assert len(angles.lines) == 6
     assert np.array_equal(angles.lines[0].get_ydata(), loaded.q_motors[:, 0])
     assert np.array_equal(angles.lines[1].get_ydata(), rigid.q_motors[:, 0])
     assert angles.get_ylabel() == "motor angle [rad]"
-    moments = trajectories.link_moments(loaded).axes[0]
+    moments = trajectory_pictures.link_moments(loaded).axes[0]
     assert moments.get_ylim()[1] > arm.spring_groups[0].wrinkling_moment
     scene = trajectories.poses(loaded).axes[0]
     ends = np.array(scene.lines[1].get_data_3d())[:, -1]
     assert np.allclose(ends, loaded.tip_positions[0], atol=1e-12)
-    errors = trajectories.tip_errors({"a": loaded.tip_error}, loaded.times).axes[0]
+    errors = trajectory_pictures.tip_errors({"a": loaded.tip_error}, loaded.times).axes[0]
     assert errors.get_yscale() == "log"
     with pytest.raises(sr.ParameterError, match="a Trajectory"):
         trajectories.poses(None)
     with pytest.raises(sr.ParameterError, match="shown"):
         trajectories.poses(loaded, shown=-2)
     with pytest.raises(sr.ParameterError, match="errors"):
-        trajectories.tip_errors({"a": loaded.tip_error[:3]}, loaded.times)
+        trajectory_pictures.tip_errors({"a": loaded.tip_error[:3]}, loaded.times)
     with pytest.raises(sr.ParameterError, match="13 waypoints"):
-        trajectories.motor_angles(loaded, sr.follow_trajectory(arm, path.positions[:3]))
+        trajectory_pictures.motor_angles(loaded, sr.follow_trajectory(arm, path.positions[:3]))
     plain = sr.load_model(arm.urdf, springs=dict.fromkeys(arm.spring_joints) | {"spring_1_up": 100.0}, motors=arm.motor_joints)
     with pytest.raises(sr.ParameterError, match="with inflated links"):
-        trajectories.link_moments(sr.follow_trajectory(plain, path.positions[:2]))
+        trajectory_pictures.link_moments(sr.follow_trajectory(plain, path.positions[:2]))
 
 
 def test_identification_errors_counts_intervals_and_chooses_poses(

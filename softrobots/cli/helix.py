@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -11,14 +11,12 @@ import numpy as np
 
 from softrobots import helix
 from softrobots.cli.options.command_line import add_numbers
-from softrobots.cli.options.output_files import add_plot, check_plot, write_plot
 from softrobots.cli.reports.answers import Fact, add_json, answer_of, lines_of, print_answer
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.core.files import new_file
 from softrobots.core.summary import aligned
 from softrobots.helix.template import write_template
 from softrobots.robots import HelixTube
-from softrobots.view.figures import helices
 
 _EXAMPLES = """examples:
   softrobots helix forward --contraction 0.66 --angle 0.0873       actuator -> helix
@@ -32,7 +30,7 @@ All lengths in m, all angles in rad (5 degrees are 0.0873 rad). Defaults are tho
 """
 
 _JSON = """With --json: one object with the facts by their names in the library, their units under "units", and the files
-that were written under "files".
+that `design` has written under "files".
 """
 
 
@@ -83,6 +81,7 @@ def add_parser(subparsers: Any) -> None:
     design.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="save the design in a new file (none)")
     help_text = "draw the unrolled tube to scale, with where to pinch it, into a new file (none)"
     design.add_argument("--template", type=Path, metavar="FILE.svg", help=help_text)
+    design.add_argument("--overwrite", action="store_true", help="allow files to be replaced")
     help_text = "spacing of the pinches along the actuator, adjusted to a whole number of them [m] (%(default)s)"
     add_numbers(design, "--spacing", "S", help_text, default=0.02)
     help_text = "how the actuator is fabricated (%(default)s)"
@@ -98,7 +97,6 @@ def add_parser(subparsers: Any) -> None:
     help_text = f"angle of the actuator to the axis of the tube, one or more, in [0, pi/2) [rad] ({HelixTube.angle:.6g})"
     add_numbers(limit, "--angle", "A", help_text, nargs="+", default=[HelixTube.angle])
     _add_diameter(limit)
-    add_plot(limit, "radius and pitch over contraction with the limits (up to three angles, above 0 and at most pi/4)")
     add_json(limit)
     limit.set_defaults(run=_limit)
 
@@ -115,7 +113,6 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
     add_numbers(parser, "--pressure", "P", help_text, default=HelixTube.pressure)
     help_text = "handedness of the helix (%(default)s)"
     parser.add_argument("--handedness", choices=helix.HANDEDNESS, default=HelixTube.handedness, help=help_text)
-    add_plot(parser, "the tube")
     add_json(parser)
     parser.set_defaults(run=run)
     return parser
@@ -127,30 +124,32 @@ def _add_diameter(parser: argparse.ArgumentParser) -> None:
 
 def _forward(arguments: argparse.Namespace) -> None:
     """Actuator to helix."""
-    check_plot(arguments)
     shape = helix.forward(arguments.contraction, arguments.angle, arguments.diameter)
     actuator = helix.Actuator(*map(np.asarray, (arguments.contraction, arguments.angle, arguments.diameter)))
-    _answer(arguments, _tube_facts(arguments, shape, actuator, arguments.length))
+    _answer(arguments, shape, actuator)
 
 
 def _inverse(arguments: argparse.Namespace) -> None:
     """Helix to actuator."""
-    check_plot(arguments)
     pitch = arguments.turn_height / (2.0 * np.pi) if arguments.pitch is None else arguments.pitch
     shape = helix.HelixShape(*map(np.asarray, (arguments.outer_radius, arguments.inner_radius, pitch)))
-    _answer(arguments, _tube_facts(arguments, shape, helix.inverse(shape), arguments.length))
+    _answer(arguments, shape, helix.inverse(shape))
 
 
 def _measure(arguments: argparse.Namespace) -> None:
     """Measured arcs to helix and actuator."""
-    check_plot(arguments)
     shape = helix.measure(arguments.outer_arc, arguments.inner_arc, arguments.diameter, arguments.turns)
-    _answer(arguments, _tube_facts(arguments, shape, helix.inverse(shape), arguments.length))
+    _answer(arguments, shape, helix.inverse(shape))
+
+
+def _answer(arguments: argparse.Namespace, shape: helix.HelixShape, actuator: helix.Actuator) -> None:
+    """Print the facts of a tube of the length that was given."""
+    facts = _tube_facts(arguments, shape, actuator, arguments.length)
+    print_answer(arguments, answer_of(facts), lines_of(facts))
 
 
 def _design(arguments: argparse.Namespace) -> None:
     """Required helix to actuator and tube."""
-    check_plot(arguments)
     for path in (arguments.output, arguments.template):
         if path is not None:
             new_file(path, overwrite=arguments.overwrite)  # refused before the work
@@ -178,7 +177,7 @@ def _design(arguments: argparse.Namespace) -> None:
             Fact("spacing", pattern.spacing, "m", "from one to the next along the actuator"),
         ]
         files.append(write_template(pattern, arguments.template, overwrite=arguments.overwrite))
-    _answer(arguments, facts, files)
+    print_answer(arguments, answer_of(facts), lines_of(facts), files)
 
 
 def _designed(arguments: argparse.Namespace) -> helix.HelixDesign:
@@ -201,7 +200,6 @@ def _designed(arguments: argparse.Namespace) -> helix.HelixDesign:
 
 def _limit(arguments: argparse.Namespace) -> None:
     """Angles to the limits of contraction."""
-    check_plot(arguments)
     exact = helix.contraction_limit(arguments.angle, arguments.diameter)
     simple = helix.simple_contraction_limit(arguments.angle)
     facts = [
@@ -209,19 +207,9 @@ def _limit(arguments: argparse.Namespace) -> None:
         Fact("contraction_limit", exact, "-", "smallest contraction, exact"),
         Fact("simple_contraction_limit", simple, "-", "by the simple rule"),
     ]
-    files = write_plot(arguments, lambda: helices.radius_and_pitch(arguments.angle, arguments.diameter))
     rows = [("angle [rad]", "smallest contraction [-]", "by the simple rule [-]")]
     rows += [tuple(f"{number:.6f}" for number in row) for row in zip(arguments.angle, exact, simple, strict=True)]  # type: ignore[misc]
-    print_answer(arguments, answer_of(facts), aligned(rows), files)
-
-
-def _answer(arguments: argparse.Namespace, facts: list[Fact], files: Sequence[Path] = ()) -> None:
-    """Print the facts, and draw the tube."""
-    values = {fact.name: fact.value for fact in facts}
-    angle, contraction, diameter = (float(values[name]) for name in ("angle", "contraction", "diameter"))
-    tube = ([contraction], [angle], diameter, values["length"], values["handedness"])
-    files = [*files, *write_plot(arguments, lambda: helices.grid(*tube))]
-    print_answer(arguments, answer_of(facts), lines_of(facts), files)
+    print_answer(arguments, answer_of(facts), aligned(rows))
 
 
 def _tube_facts(arguments: argparse.Namespace, shape: helix.HelixShape, actuator: helix.Actuator, length: float) -> list[Fact]:

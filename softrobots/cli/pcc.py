@@ -10,7 +10,6 @@ import numpy as np
 
 from softrobots import constant_curvature
 from softrobots.cli.options.command_line import add_numbers, refuse_too_large
-from softrobots.cli.options.output_files import add_plot, check_plot, write_plot
 from softrobots.cli.reports.answers import Fact, add_json, answer_of, print_answer
 from softrobots.constant_curvature import Arc
 from softrobots.constant_curvature.poses import FRAMES
@@ -21,7 +20,6 @@ from softrobots.core.suspicion import stretched_too_far
 from softrobots.model.loader import load_model
 from softrobots.robots import PccArm
 from softrobots.statics.inverse_kinematics import solve_ik
-from softrobots.view.figures import segments
 
 REST = float(PccArm.segment_lengths[0])
 """Default rest length of a segment [m]."""
@@ -31,7 +29,7 @@ _EXAMPLES = """examples:
   softrobots pcc forward 0.50 0.53 0.55 --distance 0.03 --jacobian
   softrobots pcc forward 0.5 0.52 0.5 0.48 --azimuths 0 1.5708 3.1416 -1.5708     one segment of four muscles
   softrobots pcc inverse --arc 0.52 0.7 -0.4 --arc 0.53 0.5 1.2    arcs -> muscle lengths
-  softrobots pcc reach 0.45 -0.32 0.84 --plot arm.png              position of the tip -> muscle lengths, without load
+  softrobots pcc reach 0.45 -0.32 0.84                             position of the tip -> muscle lengths, without load
 
 All lengths in m, all angles in rad. Defaults are those of the robot pcc_arm. These forms know no load and no weight;
 `softrobots solve pcc_arm` and `softrobots ik pcc_arm` do.
@@ -40,7 +38,7 @@ All lengths in m, all angles in rad. Defaults are those of the robot pcc_arm. Th
 _JSON = """With --json: one object with these names, and their units under "units": muscle_lengths (segment, muscle),
 muscle_extension (length over rest length, less 1), muscle_residual (segment), arc_length, arc_bending, arc_azimuth (segment),
 transforms (segment, 4, 4; end of a segment to base), tip_position, tip_direction (its z axis), jacobian (6, muscles; of
-the tip, linear rows first; null without --jacobian), target and error with reach, frame, and files (those written).
+the tip, linear rows first; null without --jacobian), target and error with reach, and frame.
 """
 
 
@@ -103,14 +101,12 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
         parser.add_argument("--frame", choices=FRAMES, default=FRAMES[0], help=help_text)
     help_text = "also the Jacobian of the tip with respect to muscle lengths [m/m, rad/m] (left out)"
     parser.add_argument("--jacobian", action="store_true", help=help_text)
-    add_plot(parser, "the smooth backbone with its muscles")
     add_json(parser)
     return parser
 
 
 def _forward(arguments: argparse.Namespace) -> None:
     """Muscle lengths to arcs."""
-    check_plot(arguments)
     lengths, count = np.array(arguments.lengths), len(arguments.azimuths)
     if len(lengths) % count:
         raise ParameterError("L", arguments.lengths, f"a multiple of {count} numbers, {count} muscles per segment [m]")
@@ -127,7 +123,6 @@ def _forward(arguments: argparse.Namespace) -> None:
 
 def _inverse(arguments: argparse.Namespace) -> None:
     """Arcs to muscle lengths."""
-    check_plot(arguments)
     arcs = Arc(*np.array(arguments.arcs).T)
     distance = _per_segment("--distance", arguments.distance, len(arguments.arcs))
     lengths = constant_curvature.muscles_from_arc(arcs, distance, arguments.azimuths)
@@ -136,7 +131,6 @@ def _inverse(arguments: argparse.Namespace) -> None:
 
 def _reach(arguments: argparse.Namespace) -> None:
     """Position of the tip to muscle lengths: the inverse kinematics of the arm, weightless and with one section a segment."""
-    check_plot(arguments)
     rest = arguments.rest or [REST]
     count = arguments.segments
     if count is None:
@@ -176,7 +170,7 @@ def _per_segment(name: str, values: Sequence[float], count: int) -> FloatArray:
 def _answer(
     arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, distance: FloatArray, further: Sequence[Fact] = ()
 ) -> None:
-    """Print the facts of the segments, and draw them.
+    """Print the facts of the segments.
 
     Args:
         arguments: The options.
@@ -208,8 +202,7 @@ def _answer(
         *further,
         Fact("frame", frame, "", "frame"),
     ]
-    files = write_plot(arguments, lambda: segments.arm(arcs, distance, azimuths, offsets, frame))
-    print_answer(arguments, answer_of(facts), _lines(facts), files)
+    print_answer(arguments, answer_of(facts), _lines(facts))
 
 
 def _lines(facts: list[Fact]) -> list[str]:

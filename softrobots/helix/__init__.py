@@ -1,7 +1,6 @@
 """Helical actuation of an inflated tube in closed form; [Blumenschein 2018]. NumPy alone; `bent_tube` needs SciPy too."""
 
 from softrobots.helix.actuators import INTERPOLATIONS, ActuatorTable, contraction_from_stoppers, gap_for
-from softrobots.helix.atlas import ShapeRow, ShapeTable, paper_grid, shape_table
 from softrobots.helix.contact import (
     ON_CONTACT,
     SelfContact,
@@ -55,8 +54,6 @@ __all__ = [
     "SelfContact",
     "SelfContactWarning",
     "ShapeError",
-    "ShapeRow",
-    "ShapeTable",
     "SheetPoints",
     "Wish",
     "actuator_curvature_torsion",
@@ -81,12 +78,10 @@ __all__ = [
     "material_twist",
     "measure",
     "normals",
-    "paper_grid",
     "pinch_pattern",
     "points",
     "self_contact",
     "shape_error",
-    "shape_table",
     "simple_contraction_limit",
     "tangents",
     "transform_base_to_axis",

@@ -30,7 +30,7 @@ from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.core.files import as_path, csv_text, write_text
 from softrobots.core.summary import Summarised
-from softrobots.helix.shapes import HelixShape, checked_contraction, forward
+from softrobots.helix.shapes import checked_contraction
 
 INTERPOLATIONS = ("linear", "pchip")
 """Straight between the rows, or SciPy's monotone cubic, which has a continuous slope."""
@@ -176,41 +176,6 @@ class ActuatorTable(Summarised):
             enough = cubic(middle) >= contractions
             low, high = np.where(enough, low, middle), np.where(enough, middle, high)
         return np.asarray(high)
-
-    def slope_at(self, pressure: Any) -> FloatArray:
-        """Return the derivative of the contraction with respect to the pressure.
-
-        Args:
-            pressure: Gauge pressure within `pressure_limits`, shape (...) [Pa].
-
-        Returns:
-            Slope, shape (...) [1/Pa]. At an inner row of a linear table it is the slope above the row.
-
-        Raises:
-            ParameterError: If a pressure is not finite or beyond the limits.
-        """
-        pressures = _within("pressure", pressure, self.pressure_limits, "Pa")
-        if self.interpolation == "pchip":
-            return np.asarray(self._cubic(pressures, 1))
-        place = np.clip(np.searchsorted(self.pressure, pressures, side="right"), 1, len(self.pressure) - 1)
-        return np.asarray((np.diff(self.contraction) / np.diff(self.pressure))[place - 1])
-
-    def shape_at(self, pressure: Any, angle: Any, diameter: Any) -> HelixShape:
-        """Return the helix of a tube with this actuator at a pressure of the actuator: `forward` of `contraction_at`.
-
-        Args:
-            pressure: Gauge pressure of the actuator within `pressure_limits` [Pa].
-            angle: Angle `theta` of the actuator to the axis of the tube, in [0, pi/2) [rad].
-            diameter: Diameter `D` of the tube, positive [m].
-
-        Returns:
-            The shape, of the common shape of the arguments.
-
-        Raises:
-            ParameterError: If an argument is out of range or the shapes do not broadcast.
-            StraightTube: Where the contraction is 1 and the angle 0, or nearly so.
-        """
-        return forward(self.contraction_at(pressure), angle, diameter)
 
     @cached_property
     def _cubic(self) -> Any:

@@ -148,7 +148,6 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "check_self_contact": (helix.check_self_contact, {"shape": SHAPE, "turns": 3.0, "on_contact": "error"}),
     "contraction_limit": (helix.contraction_limit, {"angle": 0.0873, "diameter": 1.0}),
     "simple_contraction_limit": (helix.simple_contraction_limit, {"angle": 0.0873}),
-    "shape_table": (helix.shape_table, ACTUATOR),
     "grasp_force": (
         helix.grasp_force,
         {
@@ -190,8 +189,6 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "contraction_at": (lambda pressure: [table.contraction_at(pressure) for table in TABLES], {"pressure": 1e4}),
     "pressure_for": (lambda contraction: [table.pressure_for(contraction) for table in TABLES], {"contraction": 0.65}),
-    "slope_at": (lambda pressure: [table.slope_at(pressure) for table in TABLES], {"pressure": 1e4}),
-    "shape_at": (TABLES[0].shape_at, {"pressure": 1e4, "angle": 0.1, "diameter": 0.03}),
     "bent_tube": (
         helix.bent_tube,
         {**ACTUATOR, "length": 0.1, "handedness": "right", "samples": 3, "tolerance": 1e-4, "breakpoints": ()},

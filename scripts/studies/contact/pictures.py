@@ -8,8 +8,9 @@ import numpy as np
 
 import softrobots as sr
 from softrobots.core.checks import FloatArray
-from softrobots.view.figures import canvas, contacts
+from softrobots.view.figures import canvas
 from studies.contact import examples
+from studies.contact.force_picture import contact_forces
 
 FRICTION = 0.5
 """Coefficient of friction for what a grip holds [-]."""
@@ -67,4 +68,4 @@ def contact_grip() -> Any:
 def contact_peg_forces() -> Any:
     """The forces of the pegs of docs/contact.md."""
     path = examples.snake(np.linspace(0.0, examples.STROKE, 61))
-    return contacts.contact_forces(path, parameter="way of the pegs [m]")
+    return contact_forces(path, parameter="way of the pegs [m]")

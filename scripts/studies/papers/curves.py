@@ -9,9 +9,9 @@ import numpy as np
 from softrobots import helix, inflated_beam
 from softrobots.core.files import csv_text, write_text
 from softrobots.core.result_file import save_csv
-from softrobots.helix.atlas import PAPER_ANGLES, PAPER_DIAMETER
 from softrobots.inflated_beam import TABLE_3
 from studies.papers.arm_path import movement
+from studies.papers.helix_grid import PAPER_ANGLES, PAPER_DIAMETER, paper_grid
 
 
 def write_curves(name: str, folder: Path) -> list[Path]:
@@ -36,7 +36,7 @@ def write_curves(name: str, folder: Path) -> list[Path]:
         ]
     if name == "helical_actuation":
         return [
-            helix.paper_grid().write_csv(folder / "helix_grid.csv"),
+            paper_grid().write_csv(folder / "helix_grid.csv"),
             write_text(folder / "helix_curves.csv", _radius_and_pitch(), overwrite=False),
             write_text(folder / "helix_grasp.csv", _grasp(), overwrite=False),
         ]

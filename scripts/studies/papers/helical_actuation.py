@@ -1,6 +1,6 @@
 """[Blumenschein 2018], helical actuation of an inflated tube: its equations, numbers and curves beside ours.
 
-The test grid and the grasped cylinder of the paper are `softrobots.helix.atlas` and `softrobots.helix.PAPER_CYLINDER`; other
+The test grid and the grasped cylinder of the paper are `studies.papers.helix_grid` and `softrobots.helix.PAPER_CYLINDER`; other
 printed numbers stand here.
 
 References:
@@ -15,9 +15,9 @@ import numpy as np
 from softrobots import helix
 from softrobots.core.checks import FloatArray
 from softrobots.helix import PAPER_CYLINDER
-from softrobots.helix.atlas import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
 from studies.papers import helix_equations as printed
 from studies.papers.helix_equations import Shape
+from studies.papers.helix_grid import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED, paper_grid
 from studies.papers.rows import MEASURED, UNPUBLISHED, Row, absent, equation, erratum, largest, mended, own, rounded, taken
 
 TITLE = "Helical actuation [Blumenschein 2018]"
@@ -161,7 +161,7 @@ def measuring() -> list[Row]:
 
 def figures_5_to_7() -> list[Row]:
     """The grid, the scaled helix, and the curves of outer radius and pitch."""
-    table = helix.paper_grid().rows
+    table = paper_grid().rows
     grid = table[: len(PAPER_ANGLES) * len(PAPER_CONTRACTIONS)]
     note = "of the grid 2.5, 5, 10 degrees by lambda 0.5 to 0.9 in steps of 0.1 (steps ours), D = 3.31 cm"
     rows = [own("Figure 5", "helices that would run into themselves", float(sum(not row.realisable for row in grid)), "", note)]

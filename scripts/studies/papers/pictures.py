@@ -12,13 +12,14 @@ import numpy as np
 
 from softrobots import constant_curvature as cc
 from softrobots import helix
-from softrobots.helix.atlas import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
 from softrobots.inflated_beam import TABLE_3
-from softrobots.view.figures import helices, inflated_link, trajectories
+from softrobots.view.figures import trajectories
 from softrobots.view.figures.canvas import COLOURS, WIDTH, equal_box, new_figure
-from softrobots.view.figures.helix_sheet import draw, sheet
-from studies.papers import pcc_equations, pcc_two_segments
+from studies.papers import helices, link_pictures, pcc_equations, pcc_two_segments, trajectory_pictures
 from studies.papers.arm_path import GAIN, movement
+from studies.papers.grasp_picture import grasp
+from studies.papers.helix_grid import PAPER_ANGLES, PAPER_CONTRACTIONS, PAPER_DIAMETER, PAPER_SCALED
+from studies.papers.helix_sheet import draw, sheet
 from studies.papers.inflatable_arm import RADIUS
 
 
@@ -35,7 +36,7 @@ class Picture(NamedTuple):
 
 def moment_angle_law() -> Any:
     """Moment over angle of the link from Table 3, a line a pressure: after [Troise 2021] Figure 9."""
-    return inflated_link.moment_angle_laws(TABLE_3, 1e-3 * float(RADIUS))
+    return link_pictures.moment_angle_laws(TABLE_3, 1e-3 * float(RADIUS))
 
 
 def tracking() -> Any:
@@ -46,7 +47,7 @@ def tracking() -> Any:
         f"recursion of Figure 6, gain {GAIN:g} 1/s": ours.closed_loop.tip_error,
         "Newton at every waypoint": ours.loaded.tip_error,
     }
-    return trajectories.tip_errors(errors, ours.loaded.times)
+    return trajectory_pictures.tip_errors(errors, ours.loaded.times)
 
 
 def two_segments() -> Any:
@@ -111,11 +112,11 @@ PICTURES: Mapping[str, Mapping[str, Picture]] = {
             lambda: trajectories.poses(movement().loaded), "Figure 10: the arm along a path; start and end are ours."
         ),
         "arm_angles": Picture(
-            lambda: trajectories.motor_angles(movement().loaded, movement().rigid),
+            lambda: trajectory_pictures.motor_angles(movement().loaded, movement().rigid),
             "Figure 11: angles of the motors on our path.",
         ),
         "arm_moments": Picture(
-            lambda: trajectories.link_moments(movement().loaded),
+            lambda: trajectory_pictures.link_moments(movement().loaded),
             "Section 4: moments of the links on our path, and the limit at 50 kPa.",
         ),
         "arm_tracking": Picture(tracking, "Figure 6: how near the recursion follows our path."),
@@ -138,7 +139,7 @@ PICTURES: Mapping[str, Mapping[str, Picture]] = {
             "helix_shapes.png",
         ),
         "helix_grasp": Picture(
-            lambda: helices.grasp(helix.PAPER_CYLINDER, 10e3),
+            lambda: grasp(helix.PAPER_CYLINDER, 10e3),
             "Figure 9: grasp force of our model; the paper's are measured.",
         ),
     },

@@ -1,4 +1,4 @@
-"""Figures of paths in contact. Needs matplotlib (extra `plot`)."""
+"""Figure of the forces along a path in contact."""
 
 from __future__ import annotations
 

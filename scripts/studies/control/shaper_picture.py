@@ -1,7 +1,4 @@
-"""Figures of input shaping. Needs matplotlib (extra `plot`).
-
-The functions return a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`.
-"""
+"""Figure of what input shapers leave of a vibration."""
 
 from __future__ import annotations
 
