@@ -242,7 +242,7 @@ def test_numba_is_taken_if_it_is_there(monkeypatch: pytest.MonkeyPatch, arm: Sof
     assert available_backend() == "python"
     assert isinstance(make_run(program_of(arm), "python"), PythonRun)
     with pytest.raises(sr.MissingDependency, match="fast"):
-        make_run(program_of(arm), "numba")
+        sr.compile(arm, backend="numba")
 
 
 @pytest.fixture(scope="session")

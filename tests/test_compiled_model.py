@@ -673,7 +673,7 @@ def test_nothing_else_compiles_silently(arm: sr.SoftModel, monkeypatch: pytest.M
     sr.follow_trajectory(arm, [(0.8, 0.1, 0.2), (0.8, 0.1, 0.21)])
     sr.sample_workspace(arm, 3)
     with pytest.raises(AssertionError, match="without being asked"):
-        sr.compile(arm)
+        sr.compile(arm).equilibrium((0.1, 0.2, 0.3))
 
 
 def test_what_is_printed(plain: CompiledModel) -> None:

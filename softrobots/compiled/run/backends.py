@@ -126,13 +126,7 @@ class NumbaRun(Run):
     """Functions compiled by numba, cached on disk for the next process."""
 
     def __init__(self, program: Program) -> None:
-        """Prepare a program; each function is compiled on its first call.
-
-        Raises:
-            MissingDependency: If numba is not installed.
-        """
-        if importlib.util.find_spec("numba") is None:
-            raise MissingDependency("numba", "fast")
+        """Prepare a program; each function is compiled on its first call."""
         super().__init__(program, numba_module(f"{program.text}\n\n{program.lane_text}", _SINGLE))
 
 
@@ -204,8 +198,14 @@ def _guarded(function: Callable[..., int], careful: Callable[..., int]) -> Calla
     return run
 
 
+def require_numba() -> None:
+    """Raise MissingDependency if numba is not installed."""
+    if importlib.util.find_spec("numba") is None:
+        raise MissingDependency("numba", "fast")
+
+
 def make_run(program: Program, backend: str) -> Run:
-    """Load a program in the back end "numba" or "python"; see `NumbaRun` for a missing numba."""
+    """Load a program in the back end "numba" or "python"."""
     return NumbaRun(program) if backend == "numba" else PythonRun(program)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.run.backends import BACKENDS, available_backend
+from softrobots.compiled.run.backends import BACKENDS, available_backend, require_numba
 from softrobots.compiled.run.batches import batch_rows, fail, flat_targets, gravity_vector, unusable, without
 from softrobots.compiled.run.compiled_dynamics import CompiledDynamics
 from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE
@@ -47,6 +47,8 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
     """
     check_model(model)
     chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
+    if chosen == "numba":
+        require_numba()
     if isinstance(locked_strains, str) or not isinstance(locked_strains, Iterable):
         raise ParameterError("locked_strains", locked_strains, f"a tuple of names, of {', '.join(STRAINS)}")
     return CompiledModel(model, chosen, tuple(locked_strains))
@@ -61,9 +63,8 @@ class CompiledModel(CompiledDynamics):
     """
 
     def __init__(self, *given: Any) -> None:
-        """Generate and load the code, see `CompiledStatics`; call `softrobots.compile` instead."""
+        """Read the robot, see `CompiledStatics`; call `softrobots.compile` instead."""
         super().__init__(*given)
-        self._estimate, self._torques = self._run(False).estimate, self._layout.torques
         self._plain_estimate = self._plain and self._unknowns.moved_by_motors
 
     def estimate_load(
@@ -99,11 +100,12 @@ class CompiledModel(CompiledDynamics):
             and q_motors.shape == self._shape
             and motor_torques.shape == self._shape
         ):
-            w = np.zeros(self._size)
+            _, size, layout = self._light or self._weightless()
+            w = np.zeros(size)
             w[: self._motors] = q_motors
-            w[self._torques : self._torques + self._motors] = motor_torques
+            w[layout.torques : layout.torques + self._motors] = motor_torques
             if self._estimate(w) == 0:
-                return CompiledLoadEstimate(w, self._layout, self._actuation)
+                return CompiledLoadEstimate(w, layout, self._actuation)
         return self._checked_estimate(q_motors, motor_torques, gravity, previous)
 
     def _checked_estimate(self, q_motors: Any, motor_torques: Any, gravity: Any, previous: Any) -> CompiledLoadEstimate:

@@ -36,18 +36,18 @@ class CompiledStatics(CompiledCode):
     def __init__(
         self, model: SoftModel, backend: str, locked_strains: tuple[str, ...], shared: SharedCode | None = None
     ) -> None:
-        """Generate and load the code; call `softrobots.compile` instead."""
+        """Read the robot; its code is generated on first use. Call `softrobots.compile` instead."""
         super().__init__(model, backend, locked_strains, shared)
         self._actuation = Actuation(model, self._unknowns, None if shared is None else shared.numbers)
         self._shape = (model.n_motors,)
         self._motors = model.n_motors
-        run = self._run(False)
-        self._settle, self._size, self._layout = run.settle, run.program.size, run.layout
         self._touching: ContactSolver | None = None  # the solver in contact, once it is made
-        self._heavy: Any = None  # the same of the code with weight, once it is made
+        self._light: Any = None  # what single equilibria take of the code without weight, once it is made
+        self._heavy: Any = None  # the same of the code with weight
         self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
-        self._plain = not (self._unknowns.n_constraints or self._layout.rubbing or self._layout.inputs) and backend == "numba"
+        self._rubs = bool(self._chain.friction) or self._chain.guides is not None
+        self._plain = not (self._unknowns.n_constraints or self._rubs or self._inputs is not None) and backend == "numba"
         self._joints = self._chain.n_motors
 
     @property
@@ -101,7 +101,7 @@ class CompiledStatics(CompiledCode):
         ):
             joints, down = self._joints, None if gravity is None else self._plain_gravity(gravity)
             if gravity is None or down is not None:
-                settle, size, layout = (self._settle, self._size, self._layout) if gravity is None else self._heavy
+                settle, size, layout = (self._light or self._weightless()) if gravity is None else self._heavy
                 w = np.zeros(size)
                 if joints == self._motors:
                     w[:joints] = q_motors
@@ -114,6 +114,12 @@ class CompiledStatics(CompiledCode):
                 if settle(w) == 0:
                     return CompiledEquilibrium(w, layout, self._actuation)
         return self._checked_equilibrium(q_motors, force, gravity, q_springs0, previous)
+
+    def _weightless(self) -> Any:
+        run = self._run(False)
+        self._estimate = run.estimate
+        self._light = run.settle, run.program.size, run.layout
+        return self._light
 
     def _plain_gravity(self, gravity: Any) -> FloatArray | None:
         """Return gravity that needs no check but that of the generated code: an array, or the tuple of the last call."""
@@ -153,7 +159,7 @@ class CompiledStatics(CompiledCode):
 
     def _before(self, previous: Any, *, single: bool = False) -> StatesBefore | None:
         """Return the states before a step, see `states_before`; None for a robot without dry friction."""
-        if self._layout.rubbing:
+        if self._rubs:
             before = states_before(self._actuation, previous)
             if single and (len(before.springs) != 1 or before.lost[0]):
                 raise ParameterError("previous", previous, "one equilibrium")
