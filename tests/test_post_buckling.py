@@ -325,7 +325,7 @@ def check_branches_at_a_plateau(links: int, plateau: float) -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(3, len(PLATEAUS))
+@pytest.mark.shortened(2, len(PLATEAUS))
 @pytest.mark.parametrize("links", [1, 2, 3])
 def test_no_branch_is_lost_at_any_plateau(links: int, cases: int) -> None:
     for plateau in PLATEAUS[:: -round(len(PLATEAUS) / cases)]:
