@@ -37,7 +37,7 @@ class ParameterError(SoftRobotsError, ValueError):
 
     def __init__(self, field: str, value: Any, requirement: str) -> None:
         """Create the error `<field> = <value>: <field> must be <requirement>`."""
-        super().__init__(f"{field} = {_short(value)}: {field} must be {requirement}")
+        super().__init__(f"{field} = {short(value, _LONGEST)}: {field} must be {requirement}")
         self.field = field
         self.value = value
         self.requirement = requirement
@@ -183,9 +183,10 @@ def _rebuild(kind: type[SoftRobotsError], arguments: tuple[Any, ...], attributes
     return error
 
 
-def _short(value: Any) -> str:
+def short(value: Any, longest: int = 60) -> str:
+    """Return the `repr` of a value in one line, of a long one its beginning."""
     try:
         text = repr(value).replace("\n", " ")
     except Exception:  # too deep a nesting, an integer of too many digits, an object of the caller
         text = f"<{type(value).__name__}>"
-    return text if len(text) <= _LONGEST else text[: _LONGEST - 3] + "..."
+    return text if len(text) <= longest else f"{text[: longest - 3]}..."

@@ -8,6 +8,7 @@ from typing import Any, NamedTuple, TypeVar
 
 import numpy as np
 
+from softrobots.core.errors import short
 from softrobots.core.field_help import FieldHelp, field_unit, with_field_help
 
 Class = TypeVar("Class", bound=type)
@@ -19,7 +20,6 @@ MOST_ROWS = 20
 """Rows of a table that a summary shows; of a longer one the first and the last."""
 
 _SHOWN = 6  # numbers of an array that are shown; of a longer one its shape and its range
-_LONGEST = 60  # characters of a text in a `repr`
 
 
 class Table(NamedTuple):
@@ -216,12 +216,6 @@ def brief(result: Any) -> str:
     arrays = {name: getattr(result, name) for name in _field_names(result)} if not words else {}
     words += [f"{name} {value.shape}" for name, value in arrays.items() if isinstance(value, np.ndarray)][:_SHOWN]
     return f"{type(result).__name__}({', '.join(words)})"
-
-
-def short(value: Any) -> str:
-    """Return the `repr` of a name or number, of a long one its beginning."""
-    text = repr(value)
-    return text if len(text) <= _LONGEST else f"{text[: _LONGEST - 3]}..."
 
 
 def _field_names(result: Any) -> Sequence[str]:

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, instance_of, read_only
-from softrobots.core.errors import ParameterError
-from softrobots.core.summary import Part, Summarised, Table, short
+from softrobots.core.errors import ParameterError, short
+from softrobots.core.summary import Part, Summarised, Table
 from softrobots.dynamics.vibration import VibrationModes
 from softrobots.identification.derivatives.contact_derivatives import ContactDerivatives
 from softrobots.identification.derivatives.frequency_derivatives import frequency_slopes

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from softrobots.core.summary import Part, Summarised, Table, facts, short
+from softrobots.core.errors import short
+from softrobots.core.summary import Part, Summarised, Table, facts
 
 
 class SummarisedRobot(Summarised):
