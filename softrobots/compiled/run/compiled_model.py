@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -67,6 +68,10 @@ class CompiledModel(CompiledDynamics):
         super().__init__(*given)
         self._plain_estimate = self._plain and self._unknowns.moved_by_motors
 
+    @cached_property
+    def _estimate(self) -> Any:
+        return self._run(False).estimate
+
     def estimate_load(
         self, q_motors: Any, motor_torques: Any, *, gravity: Any = None, previous: Any = None
     ) -> CompiledLoadEstimate:
@@ -100,7 +105,7 @@ class CompiledModel(CompiledDynamics):
             and q_motors.shape == self._shape
             and motor_torques.shape == self._shape
         ):
-            _, size, layout = self._light or self._weightless()
+            _, size, layout = self._light
             w = np.zeros(size)
             w[: self._motors] = q_motors
             w[layout.torques : layout.torques + self._motors] = motor_torques

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -42,8 +43,6 @@ class CompiledStatics(CompiledCode):
         self._shape = (model.n_motors,)
         self._motors = model.n_motors
         self._touching: ContactSolver | None = None  # the solver in contact, once it is made
-        self._light: Any = None  # what single equilibria take of the code without weight, once it is made
-        self._heavy: Any = None  # the same of the code with weight
         self._known_gravity: tuple[Any, FloatArray | None] = (None, None)
         # Float64 arrays of the right shape go straight into the generated code; everything else is checked first.
         self._rubs = bool(self._chain.friction) or self._chain.guides is not None
@@ -101,7 +100,7 @@ class CompiledStatics(CompiledCode):
         ):
             joints, down = self._joints, None if gravity is None else self._plain_gravity(gravity)
             if gravity is None or down is not None:
-                settle, size, layout = (self._light or self._weightless()) if gravity is None else self._heavy
+                settle, size, layout = self._light if gravity is None else self._heavy
                 w = np.zeros(size)
                 if joints == self._motors:
                     w[:joints] = q_motors
@@ -115,20 +114,25 @@ class CompiledStatics(CompiledCode):
                     return CompiledEquilibrium(w, layout, self._actuation)
         return self._checked_equilibrium(q_motors, force, gravity, q_springs0, previous)
 
-    def _weightless(self) -> Any:
-        run = self._run(False)
-        self._estimate = run.estimate
-        self._light = run.settle, run.program.size, run.layout
-        return self._light
+    @cached_property
+    def _light(self) -> Any:
+        """What single equilibria take of the code without weight, which is made when it is first asked for."""
+        return self._single(False)
+
+    @cached_property
+    def _heavy(self) -> Any:
+        """The same of the code with weight."""
+        return self._single(True)
+
+    def _single(self, weight: bool) -> Any:
+        run = self._run(weight)
+        return run.settle, run.program.size, run.layout
 
     def _plain_gravity(self, gravity: Any) -> FloatArray | None:
         """Return gravity that needs no check but that of the generated code: an array, or the tuple of the last call."""
         known, vector = self._known_gravity
         if gravity is known:
             return vector
-        if self._heavy is None:
-            run = self._run(True)
-            self._heavy = run.settle, run.program.size, run.layout
         if type(gravity) is np.ndarray and gravity.dtype is DOUBLE and gravity.shape == _THREE:
             return gravity
         if type(gravity) is tuple and all(type(one) is float for one in gravity):
