@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from softrobots.dynamics import midpoint
+from softrobots.dynamics import friction_steps, midpoint
 
 MOTION_TOLERANCE = midpoint.CHANGE
 """Change of an unknown in the middle of a step of time that ends the corrections, relative to 1 rad or m or its size."""
@@ -15,6 +15,12 @@ MOTION_CORRECTIONS = midpoint.ITERATIONS
 
 MOTION_LEFT = midpoint.ROUNDED
 """Change by the last of them, below which it is not halved."""
+
+RUBBING_CORRECTIONS = float(midpoint.RUBBING_ITERATIONS)
+"""Largest number of evaluations of a step of a robot with dry friction; then it is halved."""
+
+OVERSHOT = friction_steps.OVERSHOT
+"""Slope of the energy of a step uphill at the end of a correction over that downhill at its start, above which it is cut."""
 
 RENEW_SHARE = 0.2
 """Share of the last change, above which the factors of a step are computed again: tendons go slack, or the body swings far."""

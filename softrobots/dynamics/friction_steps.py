@@ -23,7 +23,8 @@ from softrobots.model.dry_friction import DryFriction, FrictionMemory
 from softrobots.model.friction_coordinates import with_given_friction
 from softrobots.model.soft_model import SoftModel
 
-_OVERSHOT = 0.9  # slope of the energy uphill at the end of a change over that downhill at its start
+OVERSHOT = 0.9
+"""Slope of the energy uphill at the end of a change of a step over that downhill at its start, above which it is cut."""
 
 
 class StepFriction:
@@ -78,7 +79,7 @@ class LineSearch:
     def nearer(self, residual: FloatArray) -> FloatArray | None:
         """Return accelerations nearer to the minimum than the last, whose residual is given; None if they are near enough."""
         slope = float(residual.dot(self._change))
-        enough = abs(slope) <= 0.5 * abs(self._first) if self._cut else slope >= -_OVERSHOT * self._first
+        enough = abs(slope) <= 0.5 * abs(self._first) if self._cut else slope >= -OVERSHOT * self._first
         if enough or self._first <= 0.0:
             return None
         self._cut = True

@@ -25,6 +25,7 @@ N_SLIDERS: int
 N_GUIDES: int
 N_RUBBING: int
 N_STARTS: int
+N_STRAINS: int
 N_INPUTS: int
 N_MUSCLES: int
 N_MUSCLE_ROWS: int
@@ -78,11 +79,15 @@ UNKNOWN: int
 ACCELERATION: int
 BEGIN_POSITION: int
 BEGIN_VELOCITY: int
+BEYOND: int
 CHANGE: int
 COASTS: int
 FAILED: int
+LAG: int
 LAST_CHANGE: int
 LAST_STEP: int
+LINE: int
+LINE_STRAIN: int
 MOTORS: int
 MOTORS_BEGIN: int
 MOTORS_END: int
@@ -92,8 +97,12 @@ N_HISTORY: int
 PARTS: int
 POSITION: int
 RATE: int
+RATE_BEGIN: int
 SETTLED: int
 SHARE: int
+SLIDERS: int
+STRAIN_BEGIN: int
+STRAIN_CORRECTION: int
 TIME_STEP: int
 TIP: int
 VELOCITY: int
@@ -108,7 +117,6 @@ N_ELASTIC: int
 N_PLACED: int
 N_POINTS: int
 N_SPRINGS: int
-N_STRAINS: int
 PLACED_COORDINATE: tuple[int, ...]
 PLACED_KIND: tuple[int, ...]
 PLACEMENTS: int
@@ -165,6 +173,7 @@ apply_correction: Callable[[Array, int], None]
 apply_correction_lanes: Callable[[Array, int], None]
 choose_order: Callable[[Array], None]
 choose_order_lanes: Callable[[Array], None]
+end_strains: Callable[[Array], None]
 finish_unknown: Callable[[Array, int], None]
 finish_unknown_lanes: Callable[[Array, int], None]
 guess_unknown: Callable[[Array, int], None]

@@ -47,6 +47,12 @@ def settle_middle(w: Array) -> bool:
     return w[CHANGE] < MOTION_LEFT
 
 
+def finish_step(w: Array) -> None:
+    """Go to the end of a step."""
+    for i in range(N):
+        finish_unknown(w, i)
+
+
 def motion_step(w: Array) -> int:
     """Move the robot by one step of time: POSITION and VELOCITY become those at its end.
 
@@ -72,8 +78,7 @@ def motion_step(w: Array) -> int:
             w[N_HISTORY] = 0.0
             w[LAST_STEP] = w[TIME_STEP]
         if settle_middle(w):
-            for i in range(N):
-                finish_unknown(w, i)
+            finish_step(w)
             w[N_HISTORY] += 1.0
             done += part
         else:

@@ -108,6 +108,19 @@ def store_row(w: Array, out: Any, row: int, first: int, last: int) -> None:
             out[first + lane, row, 2 * N + i] = w[(TIP + i) * LANES + lane]
 
 
+def move_alone(
+    case: Array, inputs: Rows, places: Places, motors: Any, forces: Any, grid: Any, times: Any, out: Any, one: int
+) -> int:
+    """Do a case by itself in a workspace; return the status."""
+    for i in range(WORKSPACE_SIZE):
+        case[i] = 0.0
+    load_case(case, inputs, places, one)
+    path = motors[min(one, motors.shape[0] - 1)].reshape(-1)
+    pushes = forces[min(one, forces.shape[0] - 1)].reshape(-1)
+    rows = out[one].reshape(-1)
+    return motion_run(case, path, motors.shape[1], pushes, forces.shape[1], grid, len(grid) - 1, times, len(times), rows)
+
+
 def motion_batch(
     inputs: Rows,
     places: Places,
@@ -159,12 +172,4 @@ def motion_batch(
             one = begin + lane
             statuses[one] = CERTIFIED
             if lanes[FAILED * LANES + lane] > 0.5:
-                for i in range(WORKSPACE_SIZE):
-                    case[i] = 0.0
-                load_case(case, inputs, places, one)
-                path = motors[min(one, motors.shape[0] - 1)].reshape(-1)
-                pushes = forces[min(one, forces.shape[0] - 1)].reshape(-1)
-                rows = out[one].reshape(-1)
-                statuses[one] = motion_run(
-                    case, path, motors.shape[1], pushes, forces.shape[1], grid, len(grid) - 1, times, len(times), rows
-                )
+                statuses[one] = move_alone(case, inputs, places, motors, forces, grid, times, out, one)

@@ -29,7 +29,14 @@ from softrobots.compiled.motion.articulated import (
 )
 from softrobots.compiled.motion.gauss_step import corrections, right_hand_side
 from softrobots.compiled.motion.group_record import GroupRecord
-from softrobots.compiled.motion.motion_groups import ElementParts, MovingGroup, group_signature, motion_groups, moving_parts
+from softrobots.compiled.motion.motion_groups import (
+    ElementParts,
+    MovingGroup,
+    group_rubbing,
+    group_signature,
+    motion_groups,
+    moving_parts,
+)
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block, TableColumns
@@ -101,7 +108,8 @@ def group_kinds(plan: MotionPlan, places: GroupLayout) -> list[Kind]:
     kinds: dict[Any, list[tuple[int, ...]]] = {}
     parts = moving_parts(plan.unknowns)
     for group in motion_groups(plan.unknowns):
-        signature = tuple(group_signature(plan.unknowns, row, parts[row]) for row in group)
+        rubbing = group_rubbing(plan.unknowns, group)
+        signature = *(group_signature(plan.unknowns, row, parts[row]) for row in group), rubbing and rubbing.places
         kinds.setdefault(signature, []).append(group)
     return [_trace_kind(number, groups, plan, places, parts) for number, groups in enumerate(kinds.values())]
 

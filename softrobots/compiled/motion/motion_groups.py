@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from softrobots.compiled.chain.dry_friction import Rubbing
 from softrobots.compiled.chain.elements import constants
 from softrobots.compiled.chain.looped_elements import element_signature, table_element
 from softrobots.compiled.chain.muscle_terms import pulls_on
@@ -57,7 +58,7 @@ class MovingGroup:
         self.own: list[Scalar] = []
         """`h/2 D + h^2/4 K` of each unknown."""
         self.curvatures: dict[tuple[int, int], Scalar] = {}
-        """Tensions of routes times second derivatives of their lengths, by places of two unknowns."""
+        """By places of two unknowns: what tensions times second derivatives of lengths, and friction, add to `K`."""
         self.torques: list[Scalar] = []
         """Torque of spring, damper and muscles on each unknown."""
         self.turn = constants(parts[groups[0][-1]].turn)
@@ -112,6 +113,23 @@ class MovingGroup:
             self.rates.append(rates)
             self.changes.append(changes)
             self.bodies += [_body(alike, columns) for alike in zip(*(parts[row].bodies for row in rows), strict=True)]
+        if layout.rubbing:
+            self._rub(plan, block, columns, [group_rubbing(unknowns, group) for group in groups])
+
+    def _rub(self, plan: MotionPlan, block: Block, columns: TableColumns, rubbing: Sequence[Rubbing | None]) -> None:
+        """Add the dry friction of a step, and write how far it leaves the strains from the sliders; see `friction_steps`."""
+        alike = [one for one in rubbing if one is not None]
+        if not alike:
+            return
+        layout, places = plan.layout, alike[0].places
+        at_rest = [block.load(layout.beyond + place, "q") for place in places]
+        four = [block.load(plan.strains[0] + place, "q") * 4.0 for place in range(len(self.torques))]
+        friction = Rubbing(columns.entry([one.limit for one in alike]), places, at_rest).at(four)
+        for row, place in enumerate(places):
+            self.torques[place] = self.torques[place] + friction.torque[place]
+            block.store(layout.lag + place, four[place] - friction.sliders[row], "q")
+            for pair in [(one, place) for one in places[: row + 1]]:
+                self.curvatures[pair] = friction.stiffness[pair] * 4.0 + self.curvatures.get(pair, 0.0)
 
     def joints(self, block: Block, cosines: int, sines: int) -> tuple[list[JointState], Any]:
         """Return the joints, and the derivatives of their positions by the coordinates, shape (n, k).
@@ -143,6 +161,11 @@ class MovingGroup:
                 place += 1
             placed.append(replace(element, coordinates=coordinates))
         return placed
+
+
+def group_rubbing(unknowns: Unknowns, group: Sequence[int]) -> Rubbing | None:
+    """Return the dry friction of a group, without sliders; None if it has none."""
+    return Rubbing.of(unknowns.chain.friction, [strain for row in group for strain in unknowns.moving(row)])
 
 
 def _body(bodies: Sequence[ChainBody], columns: TableColumns) -> RigidBody:

@@ -15,8 +15,9 @@ from softrobots.compiled.trace.complex_numbers import ComplexScalar
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.dynamics.gauss import EIGENVALUE, GaussRule
 
-_COUNTS = ("unknowns", "full_damping", "order", "strains", "coasting", "prepared")  # no places for callers
-_INNER = ("stages", "forces", "mass_damping", "mass_rate")  # places that some robots do not have
+_COUNTS = ("unknowns", "full_damping", "order", "strains", "coasting", "rubbing", "prepared")  # no places for callers
+_RUBBING = ("sliders", "strain_begin", "rate_begin", "beyond", "lag", "line", "line_strain")
+_INNER = ("stages", "forces", "mass_damping", "mass_rate", *_RUBBING)  # places that some robots do not have
 
 
 @dataclass(frozen=True)
@@ -40,6 +41,8 @@ class MotionLayout:
     """Number of strains of a looped chain, each with a damper; None for unrolled ones."""
     coasting: bool = False
     """Whether steps are guessed from the linear equations of the step before, too."""
+    rubbing: bool = False
+    """Whether there is dry friction."""
     motor_velocities: int = field(init=False)
     """Their velocities there (m) [rad/s or m/s]."""
     motor_accelerations: int = field(init=False)
@@ -116,6 +119,20 @@ class MotionLayout:
     """Accelerations of the unknowns at both stages (2, n)."""
     forces: int = field(init=False)
     """What is out of balance on them there (n, 2)."""
+    sliders: int = field(init=False)
+    """The sliders of dry friction of each strain before the step (N) [rad]; from here to `line_strain` with friction only."""
+    strain_begin: int = field(init=False)
+    """The strains there (N)."""
+    rate_begin: int = field(init=False)
+    """Their rates there (N)."""
+    beyond: int = field(init=False)
+    """Four times the strains in the middle where friction is at rest (N), see `softrobots.dynamics.friction_steps`."""
+    lag: int = field(init=False)
+    """How far the strains are from the sliders at the end of the step (N)."""
+    line: int = field(init=False)
+    """The last whole correction of the accelerations of the unknowns (n)."""
+    line_strain: int = field(init=False)
+    """That of the accelerations of the strains (N)."""
     prepared: int = field(init=False)
     """Values that do not depend on the unknowns, factors, records: as many places as the code needs."""
 
@@ -139,8 +156,11 @@ class MotionLayout:
         )
         path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1, parts=1, most_parts=1)
         search = dict(coasts=1, scale=n, change=1, last_change=1, change_before=1, settled=1, failed=1)
-        stages = dict(stages=(k - 1) * 2 * n, forces=k * (self.strains or 0) if k == 2 or full else 0)
-        assign_places(self, m, **given, **middle, **state, **before, **path, **search, **stages, prepared=0)
+        stages = dict(stages=(k - 1) * 2 * n, forces=k * (self.strains or 0) if k == 2 or full or self.rubbing else 0)
+        count = (self.strains or 0) * self.rubbing
+        rubbing = {name: count for name in _RUBBING} | dict(line=n * self.rubbing)
+        parts = given | middle | state | before | path | search | stages | rubbing
+        assign_places(self, m, **parts, prepared=0)
 
     def constants(self) -> dict[str, int]:
         """Return the places by their names in generated code."""
@@ -148,6 +168,8 @@ class MotionLayout:
         places = {name.upper(): place for name, place in vars(self).items() if name not in left_out}
         if self.strains is not None and self.full_damping:
             places |= {"MASS_DAMPING": self.mass_damping, "MASS_RATE": self.mass_rate}
+        if self.rubbing:
+            places |= {name.upper(): getattr(self, name) for name in _RUBBING}
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
 
 
@@ -169,7 +191,8 @@ class MotionPlan:
         count, strains = len(moving_coordinates(unknowns)), None if unknowns.is_unrolled else len(unknowns.strains)
         routed = replace(unknowns, chain=unknowns.chain.joined).routed
         coasting = self.order == GaussRule.order and strains is not None and not self.full_damping and not routed
-        return MotionLayout(len(unknowns.chain.limits), count, self.full_damping, self.order, strains, coasting)
+        given = len(unknowns.chain.limits), count, self.full_damping, self.order, strains, coasting
+        return MotionLayout(*given, bool(unknowns.chain.friction))
 
     @cached_property
     def routes(self) -> MotionRoutes | None:
@@ -193,7 +216,7 @@ class MotionPlan:
     @property
     def reduces(self) -> bool:
         """Whether torques out of balance are written first, and eliminated in a pass of their own."""
-        return self.layout.in_stages or self.routes is not None or self.layout.full_damping
+        return self.layout.in_stages or self.routes is not None or self.layout.full_damping or self.layout.rubbing
 
     def row(self, name: str) -> str:
         """Return the base of the numbers of an unknown or a strain at all stages, which stand side by side."""

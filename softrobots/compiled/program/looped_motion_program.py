@@ -66,6 +66,20 @@ _MASSIVE = """    for i in range(N):
             for stage in range(N_STAGES):
                 add_mass_SUFFIX(w, N_STAGES * i + stage, N * i + j, N_STAGES * j + stage)
 """
+_END = """
+
+
+def end_strains_SUFFIX(w: Array) -> None:
+    \"\"\"Keep the strains and their rates at the end of a step.\"\"\"
+CLOSE    for i in range(N_STRAINS):
+        w[STRAIN_BEGIN + i] = w[STRAINS_AT + i]
+        w[RATE_BEGIN + i] = w[RATES_AT + i]
+"""
+_CLOSE = """    for i in range(N):
+        w[UNKNOWN + i] = w[POSITION + i]
+        w[RATE + i] = w[VELOCITY + i]
+    follow_actuators_SUFFIX(w, 0)
+"""
 _CONTROL = '''def motion_factor_SUFFIX(w: Array) -> None:
     """Evaluate and factor; write the correction."""
 FACTOR
@@ -139,13 +153,20 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         *([] if actuators is None else [_start_reduce(places), *actuators.blocks]),
         *([_add_mass(plan, places)] if layout.full_damping else []),
     ]
+    held = routes is not None and routes.held
+    if layout.rubbing:
+        tables |= {"STRAIN_CORRECTION": plan.correction, "TORQUES": plan.torques[0]}
+        tables |= dict(
+            zip(("STRAINS_AT", "RATES_AT"), plan.strains if held else (layout.position, layout.velocity), strict=False)
+        )
     tables |= {"N_STRAINS": n, "N_BENDS": n * places.stages, "N_STAGES": places.stages, "RATES": _rates(plan, places)}
     tables |= {} if actuators is None else actuators.tables
+    end = _END.replace("CLOSE", _CLOSE if held else "") if layout.rubbing else ""
     loops, lane_loops = (
         [
             *([] if actuators is None else actuators.loops(suffix)),
             *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
-            (("" if actuators is None else actuators.after) + _control(plan, bends)).replace("_SUFFIX", suffix),
+            (("" if actuators is None else actuators.after) + _control(plan, bends) + end).replace("_SUFFIX", suffix).strip(),
         ]
         for suffix in ("", "_lanes")
     )

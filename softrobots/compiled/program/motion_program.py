@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from typing import Any
+
 from softrobots.compiled import motion_settings
 from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.drivers import motion_drivers, motion_lane_drivers
-from softrobots.compiled.drivers.lane_drivers import load_block, load_case
+from softrobots.compiled.drivers import motion_drivers, motion_lane_drivers, rubbing_motion_drivers
+from softrobots.compiled.drivers.lane_drivers import load_block, load_case, store_case
 from softrobots.compiled.motion.held_motion import in_motion
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.time_step import step_blocks
@@ -26,10 +29,10 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order
     """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix; `order`: of the steps.
 
     Raises:
-        ParameterError: If it has dry friction.
+        ParameterError: If it has friction of guides.
     """
-    if unknowns.chain.friction:
-        requirement = "a robot without dry friction, for compiled motion; simulate has it, bending_friction=0 leaves it out"
+    if unknowns.chain.guides is not None:
+        requirement = "a robot without friction of guides, for compiled motion; simulate has it, guide_friction=0 leaves it out"
         raise ParameterError("model", unknowns.chain.name, requirement)
     plan = MotionPlan(in_motion(unknowns), full_damping, order)
     layout = plan.layout
@@ -42,8 +45,16 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order
         values["STIFFNESS"] = tuple(plan.unknowns.chain.stiffness[list(plan.unknowns.strains)].tolist())
     values |= {"WORKSPACE_SIZE": parts.size, "LANE_SIZE": parts.size, "LANES": lane_count(parts.size)}
     values |= {status.name: status.value for status in _STATUSES} | parts.constants
-    text = module_text(docstring, values, blocks, parts.loops, functions_of(motion_drivers))
-    batches = lane_text(blocks, parts.lane_loops, [load_block, load_case, *functions_of(motion_lane_drivers)])
+    functions = functions_of(motion_drivers)
+    lane_functions: list[Callable[..., Any]] = [load_block, load_case, *functions_of(motion_lane_drivers)]
+    lanes, lane_loops = blocks, parts.lane_loops
+    if layout.rubbing:  # cases are done one by one
+        *own, batch = functions_of(rubbing_motion_drivers)
+        names = [one.__name__ for one in own]
+        functions = own + [one for one in functions if one.__name__ not in names]
+        lanes, lane_loops, lane_functions = [], [], [load_case, store_case, motion_lane_drivers.move_alone, batch]
+    text = module_text(docstring, values, blocks, parts.loops, functions)
+    batches = lane_text(lanes, lane_loops, lane_functions)
     entries = ("motion_step", "motion_run", "place_at", "WORKSPACE_SIZE", "N", "N_MOTORS", *places)
     entries = (*entries, *(status.name for status in _STATUSES))
     return Program(text, batches, layout, parts.size, None, entries)
@@ -71,6 +82,13 @@ def _manual(plan: MotionPlan) -> tuple[str, list[str]]:
         given.append(Place("MASS_RATE", 1, "Rayleigh's factor [1/s]"))
     given.append(Place("POSITION", n, f"unknowns at the beginning [rad or m]: {coordinates}"))
     given.append(Place("VELOCITY", n, "their velocities [rad/s or m/s]"))
+    if layout.rubbing:
+        count, carried = layout.strains or 0, "; the next step begins there"
+        given.append(Place("SLIDERS", count, "bending that friction holds, as a step leaves it, of every strain [rad]"))
+        given.append(
+            Place("STRAIN_BEGIN", count, f"strains at the beginning, at its end those there{carried}: {strain_names(unknowns)}")
+        )
+        given.append(Place("RATE_BEGIN", count, f"their rates, likewise{carried}"))
     found = [
         Place("POSITION", n, "unknowns at the end [rad or m]"),
         Place("VELOCITY", n, "their velocities [rad/s or m/s]"),

@@ -56,6 +56,8 @@ class MotionBatch(CaseResults):
     """Largest `tip_error` that was asked for [m]; None for fixed steps."""
     interrupted: bool = False
     """Whether Ctrl-C ended the run: cases that were not at their end are `Status.UNSETTLED`, with zeros for what is missing."""
+    friction_bending: FloatArray | None = None
+    """Bending that dry friction remembers at the end, shape (n, n_sections, 2) [rad]; None without it."""
 
 
 _AXES = {"tip_positions": ("tip", "m"), "tip_position": ("tip", "m"), "forces": ("force", "N")}
@@ -102,6 +104,9 @@ def _unpack(fields: Mapping[str, Any]) -> MotionBatch:
     if rows["q_springs"].shape != rows["velocities"].shape:
         raise FileFormatError("its velocities have another shape than its coordinates")
     error = finite_array("tip_error", fields["tip_error"], (len(status),), "m") if "tip_error" in fields else None
+    bending = None
+    if "friction_bending" in fields:
+        bending = finite_array("friction_bending", fields["friction_bending"], (len(status), None, 2), "rad")
     return MotionBatch(
         time=time,
         **rows,
@@ -111,6 +116,7 @@ def _unpack(fields: Mapping[str, Any]) -> MotionBatch:
         tip_error=None if error is None else np.where(error < 0.0, np.inf, error),
         tolerance=finite_number("tolerance", fields["tolerance"], "m") if "tolerance" in fields else None,
         interrupted=bool(fields["interrupted"]),
+        friction_bending=bending,
     )
 
 

@@ -16,6 +16,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.dynamics.starting import check_start
 from softrobots.dynamics.time_grid import SAME_TIME, merged_times
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
+from softrobots.model.friction_coordinates import after_step, memory_of
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.trajectory import Trajectory
@@ -30,8 +31,12 @@ class MotionCases:
         Raises:
             ParameterError: If a shape differs, the numbers of cases differ, or a path or a table is wrong.
         """
-        held = starts if isinstance(starts, Equilibrium) else None
+        held, bending = starts if isinstance(starts, Equilibrium) else None, actuation.rest_bending
+        if isinstance(starts, EquilibriumBatch | MotionBatch) and starts.friction_bending is not None:
+            bending = starts.friction_bending
         if held is not None:
+            if model.structure.friction is not None:
+                bending = memory_of(after_step(held.model, held.q_motors, held.q_springs)).bending
             starts = held.q_springs
         if isinstance(starts, MotionBatch):
             starts = starts.q_springs[:, -1], starts.velocities[:, -1]
@@ -46,22 +51,34 @@ class MotionCases:
             "forces": (np.zeros(3) if self._loads or forces is None else forces, 3),
             "starts": (model.rest if springs is None else springs, model.n_springs),
             "velocities": (np.zeros(model.n_springs) if rates is None else rates, model.n_springs),
+            "friction_bending": (np.reshape(bending, (*np.shape(bending)[:-2], -1)), actuation.rest_bending.size),
         }
         for name, moving in (("q_motors", self._paths), ("forces", self._loads)):
             if len(moving) > 1:
                 arrays[name] = np.tile(arrays[name][0], (len(moving), 1)), arrays[name][1]
-        motors, pushes, springs, rates = batch_rows(**arrays)
+        motors, pushes, springs, rates, bending = batch_rows(**arrays)
         if held is not None:
             check_start(model, held, np.array([path(0.0) for path in self._paths]) if self._paths else motors)
         self.count = len(motors)
         """Number of cases."""
-        self.bad = unusable(motors, pushes, springs, rates) | actuation.unsuited(motors)
+        self.bad = unusable(motors, pushes, springs, rates, bending) | actuation.unsuited(motors)
         """Mask of the cases with numbers that cannot be computed with, shape (n,)."""
         self.failures: dict[int, tuple[float, Exception]] = {}
         """Time [s] before which a function of a case has failed, and its error, by case."""
         self._motors, self._forces = without(motors, self.bad, model.relaxed_motors), without(pushes, self.bad)
+        self._bending = without(bending, self.bad)
         self.state = without_dust(without(springs, self.bad, model.rest)), without_dust(without(rates, self.bad))
         """Elastic coordinates and rates at the start, each shape (n, n_springs)."""
+
+    def carried(self, kicks: SpringKicks, actuation: Actuation, unknowns: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return what code of robots with dry friction carries, shape (n, 3 N), from unknowns and rates after a first kick."""
+        sliders, carried = actuation.sliders(self._bending.reshape(self.count, -1, 2)), []
+        for case in range(self.count):
+            path = self._paths[min(case, len(self._paths) - 1)] if self._paths else None
+            motors = self._motors[case] if path is None else path(0.0)
+            speeds = 0.0 * motors if path is None else path.kicks.get(0.0, 0.0 * motors)
+            carried.append(kicks.carried(sliders[case], motors, unknowns[case], speeds, rates[case]))
+        return np.array(carried)
 
     @property
     def breaks(self) -> list[FloatArray]:
@@ -78,13 +95,19 @@ class MotionCases:
         """Times at which velocities of motors of any case jump, shape (n,) [s]."""
         return merged_times(self._apart, self._end, *(path.kick_times for path in self._paths))[1:-1]
 
-    def kick(self, spring_kicks: SpringKicks, time: float, rows: slice, unknowns: FloatArray, rates: FloatArray) -> None:
-        """Let the rates of some cases, shape (n, N), jump where velocities of their motors do."""
+    def kick(
+        self, kicks: SpringKicks, time: float, rows: slice, unknowns: FloatArray, rates: FloatArray, carried: Any = None
+    ) -> None:
+        """Let the rates of some cases, shape (n, N), and of their strains where friction carries them, jump as their motors."""
         for place, case in enumerate(range(self.count)[rows] if self._paths else ()):
             path = self._paths[min(case, len(self._paths) - 1)]
             changes = [change for at, change in path.kicks.items() if abs(at - time) <= self._apart]
             if changes and np.all(np.isfinite(unknowns[place])):
-                rates[place] += spring_kicks.at(path(time), unknowns[place], changes[0])
+                motors, jump = path(time), kicks.at(path(time), unknowns[place], changes[0])
+                rates[place] += jump
+                if carried is not None:
+                    begin = 2 * carried.shape[1] // 3
+                    carried[place, begin:] += kicks.strain_rates(motors, unknowns[place], changes[0], jump)
 
     def motors(self, grid: FloatArray, rows: slice) -> FloatArray:
         """Return the motors of some cases, shape (n or 1, 2 n_steps + 1 or 1, n_motors); see `motors_of_steps`."""

@@ -51,9 +51,9 @@ def motors_at(path: MotorPath, times: FloatArray, grid: FloatArray) -> tuple[Flo
 class SpringKicks:
     """What springs do when velocities of motors jump; see `MidpointRule.kicked`."""
 
-    def __init__(self, model: SoftModel, strains: Sequence[int]) -> None:
-        """Take the robot, and which elastic coordinates can move."""
-        self._model, self._strains = model, list(strains)
+    def __init__(self, model: SoftModel, moving: Sequence[int], strains: Sequence[int]) -> None:
+        """Take the robot, which elastic coordinates can move, and its strains that are not locked."""
+        self._model, self._moving, self._strains = model, list(moving), list(strains)
         self._equations: EquationsOfMotion | None = None
 
     def at(self, motors: FloatArray, unknowns: FloatArray, change: FloatArray) -> FloatArray:
@@ -64,12 +64,31 @@ class SpringKicks:
             unknowns: The unknowns there, shape (n,) [rad or m].
             change: Jump of the velocities of the motors, shape (n_motors,).
         """
+        x, free = self._all(motors, unknowns, self._model.rest), self._model.n_motors + np.array(self._moving, dtype=np.intp)
+        mass = self._of_robot.mass_matrix(x)
+        return np.asarray(-np.linalg.solve(mass[np.ix_(free, free)], mass[free, : len(change)] @ change))
+
+    def carried(self, sliders: FloatArray, motors: FloatArray, unknowns: FloatArray, *rates: FloatArray) -> FloatArray:
+        """Return what code with dry friction carries, sliders, strains and rates (3 N); `rates` of motors and unknowns."""
+        strains = self._of_robot.strains(self._all(motors, unknowns, self._model.rest))[self._strains]
+        return np.concatenate([sliders, strains, self.strain_rates(motors, unknowns, *rates)])
+
+    def strain_rates(self, motors: FloatArray, unknowns: FloatArray, motor_rates: FloatArray, rates: FloatArray) -> FloatArray:
+        """Return the rates of the strains, shape (N,), from places and rates of motors and unknowns."""
+        x, velocities = self._all(motors, unknowns, self._model.rest), self._all(motor_rates, rates, 0.0 * self._model.rest)
+        return np.asarray(self._of_robot.strain_rates(x, velocities)[self._strains])
+
+    @property
+    def _of_robot(self) -> EquationsOfMotion:
         if self._equations is None:
             self._equations = EquationsOfMotion(self._model)
-        springs, free = np.array(self._model.rest), self._model.n_motors + np.array(self._strains, dtype=np.intp)
-        springs[self._strains] = unknowns
-        mass = self._equations.mass_matrix(np.concatenate([motors, springs]))
-        return np.asarray(-np.linalg.solve(mass[np.ix_(free, free)], mass[free, : len(change)] @ change))
+        return self._equations
+
+    def _all(self, motors: FloatArray, unknowns: FloatArray, others: FloatArray) -> FloatArray:
+        """Return motors and all elastic coordinates, or their rates."""
+        springs = np.array(others)
+        springs[self._moving] = unknowns
+        return np.concatenate([motors, springs])
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Runs of the generated code of motion: of one case, of many, with shorter and shorter steps, and once more in Python."""
+"""Runs of the generated code of motion: of one case, of many, and with shorter and shorter steps."""
 
 from __future__ import annotations
 
@@ -16,14 +16,9 @@ from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks, forces_of_steps, motors_of_steps
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import NotConverged
 from softrobots.core.progress import with_progress
-from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.gauss import GaussRule
-from softrobots.dynamics.midpoint import State, Step
-from softrobots.dynamics.motion import Motion
-from softrobots.dynamics.recorder import Recorder
-from softrobots.dynamics.step_control import NoStep, error_share, follow, halved, rule_of_order
+from softrobots.dynamics.step_control import error_share, halved
 from softrobots.dynamics.time_grid import SAME_TIME, grid_of_rows, merged_times
 
 _FIRST_STEPS = 400  # of the first of the runs that are compared
@@ -32,7 +27,6 @@ _STALLED = 4  # runs in which the error of the tip is to halve at least once
 _CHUNK = 2_000  # steps between two looks for Ctrl-C
 _CASE_STEPS = 10_000_000  # steps times cases between two looks for Ctrl-C, a second or so
 _SAMPLES = 2_000_000  # of motor positions in memory
-_WHOLE = 1e-9  # rad or m by which one midpoint step may seem to miss its end; one that was halved does so by h^2
 
 MOST_STEPS = 1_000_000
 """Most steps of one run that is refined for a tolerance."""
@@ -57,6 +51,8 @@ class StepsTaken:
     """Measured error of the tip, the largest of all rows, shape (n,) [m]."""
     is_within: bool = True
     """Whether that is within the tolerance; so are fixed steps."""
+    sliders: FloatArray | None = None
+    """Where those of dry friction are at the end, of each strain, shape (n, N) [rad]; None without."""
     failure: tuple[float, Exception] | None = None
     """Time [s] before which a function of the one case failed, and its error."""
 
@@ -151,10 +147,17 @@ def take_one(
             if end < last and grid[end] in course.path.kicks:
                 y, v = (np.array(w[place : place + n]) for place in (layout.position, layout.velocity))
                 time = float(grid[end])
-                run.put(w, layout.velocity, v + course.spring_kicks.at(course.path(time), y, course.path.kicks[time]))
+                motors, change, kicks = course.path(time), course.path.kicks[time], course.spring_kicks
+                jump = kicks.at(motors, y, change)
+                run.put(w, layout.velocity, v + jump)
+                if layout.rubbing:
+                    at = np.array(w[layout.rate_begin : layout.beyond])
+                    run.put(w, layout.rate_begin, at + kicks.strain_rates(motors, y, change, jump))
     except KeyboardInterrupt:
         interrupted = True
-    return StepsTaken(grid, rows, np.array([status if failure is None else Status.NOT_A_NUMBER]), interrupted, failure=failure)
+    sliders = np.array([w[layout.sliders : layout.strain_begin]]) if layout.rubbing else None
+    whole = np.array([status if failure is None else Status.NOT_A_NUMBER])
+    return StepsTaken(grid, rows, whole, interrupted, sliders=sliders, failure=failure)
 
 
 def _bound(run: Any, grid: FloatArray, compared: bool) -> Given:
@@ -179,9 +182,16 @@ def take_batch(
     progress: bool | str = False,
     compared: bool = False,
 ) -> StepsTaken:
-    """Take the steps of a grid with many cases; `given` has positions, velocities and what is the same for all cases."""
-    n, given = run.layout.unknowns, [*given, *((place, bound[None]) for place, bound in _bound(run, grid, compared))]
-    out = np.full((cases.count, len(times), 2 * n + 3), np.nan)
+    """Take the steps of a grid with many cases.
+
+    `given` has positions, velocities, of dry friction sliders, strains and rates, and what is the same for all cases.
+    """
+    n, strains, given = (
+        run.layout.unknowns,
+        run.layout.strain_begin - run.layout.sliders,
+        [*given, *((place, bound[None]) for place, bound in _bound(run, grid, compared))],
+    )
+    out, sliders = np.full((cases.count, len(times), 2 * n + 3), np.nan), np.zeros((cases.count, strains))
     statuses = np.full(cases.count, Status.UNSETTLED, dtype=np.uint8)  # until a case is at its end
     places = tuple(place for place, _ in given)
     most = min(4096, (_CASE_STEPS if cases.stand_still else _SAMPLES // 2) // len(grid))
@@ -206,7 +216,9 @@ def take_batch(
             out[rows, within] = found[:, :-1]
             worst = np.maximum(worst, status)
             own[:2] = [found[:, -1, :n].copy(), found[:, -1, n : 2 * n].copy()]
-            cases.kick(spring_kicks, float(grid[end]), rows, own[0], own[1])
+            cases.kick(spring_kicks, float(grid[end]), rows, *own[: 3 if strains else 2])
+        if strains:
+            sliders[rows] = own[2][:, :strains]
         statuses[rows] = worst
 
     with ThreadPoolExecutor(threads) as pool:
@@ -216,7 +228,7 @@ def take_batch(
             list(with_progress(done, progress, label=f"motions, {len(grid) - 1} steps", unit="block", total=len(blocks)))
         except KeyboardInterrupt:
             stopped.set()
-    return StepsTaken(grid, out, statuses, stopped.is_set())
+    return StepsTaken(grid, out, statuses, stopped.is_set(), sliders=sliders)
 
 
 def _stops(grid: FloatArray, kicks: FloatArray) -> set[int]:
@@ -229,67 +241,3 @@ def _times_within(times: FloatArray, grid: FloatArray, first: int, end: int) -> 
     """Which of the times are within steps `first` to `end`, without the beginning but of the first."""
     begin = 0 if first == 0 else int(np.searchsorted(times, grid[first], "right"))
     return slice(begin, len(times) if end == len(grid) - 1 else int(np.searchsorted(times, grid[end], "right")))
-
-
-def replay(
-    equations: EquationsOfMotion, course: Course, taken: StepsTaken, rows: FloatArray, facts: dict[str, Any], order: int
-) -> Motion:
-    """Return the motion with torques and energies, by Pinocchio, from the states at the ends of all steps.
-
-    Steps of fourth order are taken again, each from where the compiled ones came to; so are those that had to be halved.
-
-    Args:
-        equations: Equations of motion.
-        course: What drove it.
-        taken: The steps, with a row at each end of a step; elastic coordinates and rates instead of unknowns and theirs.
-        rows: Times of the rows, shape (n,) [s].
-        facts: Other fields of the motion.
-        order: Order of the steps.
-
-    Raises:
-        NotConverged: If such a step is not found again.
-    """
-    m, k, count = equations.n_motors, equations.n - equations.n_motors, 2 * len(taken.grid) - 1
-    motors, states = np.broadcast_to(motors_of_steps(course.path, taken.grid), (count, m)), taken.rows[0]
-
-    def still(time: float, row: int) -> State:
-        """The state of a row whose motors stand still."""
-        x, rates = np.split(states[row, : 2 * k], 2)
-        return State(time, np.concatenate([motors[0], x]), np.concatenate([np.zeros(m), rates]))
-
-    recorder = Recorder(rule_of_order(order)(equations, course.path, course.load), still(0.0, 0), rows)
-    for step, end in enumerate(taken.grid[1:].tolist()):
-        before = recorder.state
-        h, middle_time = end - before.time, 0.5 * (before.time + end)
-        u0, middle, u1 = motors[2 * step : 2 * step + 3]
-        y1, v1, v0 = states[step + 1, :k], states[step + 1, k : 2 * k], before.rates[m:]
-        accelerations = np.concatenate([4.0 * (u1 - 2.0 * middle + u0) / h**2, (v1 - v0) / h])
-        rates = np.concatenate([(u1 - u0) / h, 0.5 * (v0 + v1)])
-        x, half = np.concatenate([middle, before.x[m:] + 0.5 * h * rates[m:]]), 0.5 * h * accelerations[:m]
-        last, again = State(end, np.concatenate([u1, y1]), np.concatenate([rates[:m] + half, v1])), None
-        if order == GaussRule.order:
-            again = recorder.rule.step(before, end)
-            again = again and again._replace(end=last)
-        elif np.allclose(before.x[m:] + h * rates[m:], y1, rtol=_WHOLE, atol=_WHOLE):
-            begin = State(before.time, before.x, np.concatenate([rates[:m] - half, v0]))
-            wrenches = course.load(middle_time)
-            forces = equations.balance(x, rates, accelerations, wrenches)[:m]
-            again = Step(begin, last, State(middle_time, x, rates), accelerations, forces, wrenches)
-        kicked = end in course.path.kicks and end < recorder.duration
-        if again is None:
-            _take_parts(recorder, end)
-            recorder.state = recorder.state if kicked else last
-            continue
-        recorder.add(again)
-        if kicked:
-            recorder.kick(course.path.kicks[end])
-    return recorder.motion(**facts)
-
-
-def _take_parts(recorder: Recorder, end: float) -> None:
-    """Take a step to a time [s] that does not succeed as a whole."""
-    try:
-        list(follow(recorder, np.array([recorder.state.time, end])))
-    except NoStep as error:
-        why = f"the step to {end:g} s has no energies: Pinocchio did not find it again; required shorter steps: {error}"
-        raise NotConverged(why, best=None, residual=math.inf, iterations=len(recorder.times)) from error

@@ -139,7 +139,10 @@ class MotionBatches:
         for begin in range(first, last, BLOCK):
             rows = slice(begin, min(begin + BLOCK, last))
             own = [values[rows] if len(values) > 1 else values for values in (*inputs, motors, forces)]
-            failed = self._block(own[:-2], places, own[-2], own[-1], grid, times, out[rows])
+            alone = self._layout.rubbing
+            failed = (
+                np.ones(len(out[rows])) if alone else self._block(own[:-2], places, own[-2], own[-1], grid, times, out[rows])
+            )
             statuses[rows] = Status.CERTIFIED
             for lane in np.flatnonzero(failed):
                 case = [0.0] * self._size
@@ -151,6 +154,8 @@ class MotionBatches:
                 end = grid.tolist(), len(grid) - 1, times.tolist(), len(times), found
                 statuses[begin + lane] = self._alone.motion_run(case, *paths, *end)
                 out[begin + lane] = np.reshape(found, out[begin].shape)
+                if alone:
+                    own[2][lane] = case[places[2] : places[2] + own[2].shape[1]]
 
     def _block(self, inputs: Any, places: Places, motors: Any, forces: Any, grid: Any, times: Any, out: Any) -> Any:
         """Take the steps of a block of cases; return the mask of those that fail."""
