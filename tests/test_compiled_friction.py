@@ -371,3 +371,19 @@ def test_motors_are_found_from_a_state_before(fields: dict[str, Any]) -> None:
         last = sr.solve_equilibrium(model, motors, previous=last)
         assert np.linalg.norm(last.tip_position - target) < 2e-9
     assert np.abs((path.q_motors[2] - path.q_motors[0]) / model.motor_scale).max() > 1e-3  # the way back is another one
+
+
+@pytest.mark.study
+def test_strong_friction_in_guides_settles() -> None:
+    """Coefficient 1 and nine tensions up to 40 N: without friction the arm coils up, which must not decide what friction is.
+
+    Both engines search on their own, in other steps, and agree; the spring in line with each slider settles them to 1e-6 rad.
+    """
+    robot, rng = sr.TendonArm(kind="tension", guide_friction=1.0), np.random.default_rng(1)
+    model, fast = sr.load_model(robot), compiled(robot)
+    general = mine = None
+    for _ in range(3):
+        tensions = rng.uniform(0.0, 40.0, 9)
+        general = sr.solve_equilibrium(model, tensions, previous=general)
+        mine = fast.equilibrium(tensions, previous=mine)
+        assert mine.q_springs == pytest.approx(general.q_springs, abs=1e-6)

@@ -20,7 +20,7 @@ from softrobots.model.dry_friction import DryFriction, FrictionMemory
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.soft_model import SoftModel, check_model
 
-MOST_ROUNDS = 60
+MOST_ROUNDS = 200
 """Most changes of the friction of guides on the way to the one that stays."""
 
 SAME_FRICTION = 1e-13
@@ -188,7 +188,8 @@ class GuideFriction:
     """Friction of guides on its way to that which stays: rounds of given friction, with a secant through the last two.
 
     Rounds alone go to and fro between two states where friction is strong; of the last two changes the combination of least
-    squares vanishes at once along their line ([Anderson 1965] with a memory of one).
+    squares vanishes at once along their line ([Anderson 1965] with a memory of one). No friction grows by more than the largest
+    load in a round: a robot that coils up without it would have friction of thousands of times that.
     """
 
     def __init__(self) -> None:
@@ -220,6 +221,7 @@ class GuideFriction:
             bent = change - self._last[1]
             share = float(bent @ change) / max(float(bent @ bent), 1e-300)
             aim = np.maximum(grip - share * (grip - self._last[0]), 0.0)
+        aim = np.minimum(aim, last.grip + largest)
         self._last = grip, change
         return _rubbed(model, last.memory, aim), off / max(largest, 1e-300)
 

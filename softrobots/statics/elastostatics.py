@@ -88,6 +88,10 @@ def solve_springs(
         solve = settle
     tolerance = tolerance * (_FINER if model.structure.guided else 1.0)
     with one_blas_thread(model.n_springs):
+        if model.structure.guided:  # begins as at the start, whose friction holds the robot near to it
+            model, _ = GuideFriction().after(
+                model, q_motors, start, ElasticProblem(model, q_motors, load, tolerance).state(start).load.motors
+            )
         state, spent, stable = solve(ElasticProblem(model, q_motors, load, tolerance), start, most)
         rounds, left = GuideFriction(), MOST_ROUNDS
         while model.structure.guided:  # the friction of guides follows the tensions

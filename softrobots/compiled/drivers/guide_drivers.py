@@ -80,10 +80,13 @@ def grip(w: Array, rounds: int) -> float:
     if rounds > 0:
         share = back / bent
     for guide in range(N_GUIDES):
-        friction = w[GRIPS + guide] + w[GRIPS + 2 * N_GUIDES + guide]
+        before = w[GRIPS + guide]
+        friction = before + w[GRIPS + 2 * N_GUIDES + guide]
         w[GRIPS + guide] = friction - share * (friction - w[GRIPS + N_GUIDES + guide])
         if w[GRIPS + guide] < 0.0:
             w[GRIPS + guide] = 0.0
+        if w[GRIPS + guide] > before + largest:
+            w[GRIPS + guide] = before + largest
         w[GRIPS + N_GUIDES + guide] = friction
     return change / largest
 
@@ -92,6 +95,8 @@ def descend_rubbing(w: Array) -> int:
     """Descend from the unknowns until the friction of the guides stays the same; return the status."""
     for guide in range(N_GUIDES):
         w[GRIPS + guide] = 0.0
+    evaluate(w)
+    grip(w, 0)  # of the start, which holds the robot near to it
     status = UNSETTLED
     steps = 0.0
     for rounds in range(GUIDE_ROUNDS):
