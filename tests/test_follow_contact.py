@@ -373,3 +373,59 @@ def test_a_contact_that_sticks_only_in_small_steps_holds_nothing_up(arm: sr.Soft
     path = sr.follow_contact(arm, (0.1, 0.9, -0.4), pulls, environment=corner, friction=2.0)
     assert len(path.equilibria) == len(pulls)
     assert [contact.status for contact in path.equilibria[-1].contacts] == ["sticks", "sticks"]
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_a_bar_with_dry_friction_of_its_own_remembers_both(friction: float) -> None:
+    """A ball bends a bar of one section and goes back: the ball's work is what the bar stores and what both frictions take.
+
+    Dry friction takes its moment times the bending, whichever way; let go, the bar stays where its spring carries that moment.
+    """
+    stiffness, moment = 2e-3 / 0.06, 4e-3
+    model = sr.load_model(
+        sr.TendonArm(
+            segment_lengths=(0.06,),
+            tendon_azimuths=(),
+            bending_stiffness=2e-3,
+            elastic_sections=1,
+            bending_friction=moment,
+        )
+    )
+
+    def pose(parameter: float) -> np.ndarray:
+        there = np.eye(4)
+        there[0, 3] = 0.012 * (1.0 - abs(1.0 - parameter))  # and back
+        return there
+
+    ball = sr.Environment([sr.Sphere(0.01, position=(-0.0175, 0.0, 0.05), pose=pose, name="ball")])
+    parameters = np.linspace(0.0, 2.0, 41)
+    path = sr.follow_contact(model, [], environment=ball, friction=friction, parameters=parameters)
+    angle = np.array([row.q_springs[1] for row in path.equilibria])
+    pushed = np.array([sum((one.force[0] for one in row.contacts), 0.0) for row in path.equilibria])
+    first = int(np.flatnonzero(pushed)[0])
+    for begin, end, way in ((first, 20, 1.0), (22, int(np.flatnonzero(pushed)[-1]), -1.0)):  # it turns round in between
+        rows = slice(begin, end + 1)
+        work = float(np.trapezoid(pushed[rows], [pose(one)[0, 3] for one in parameters[rows].tolist()]))
+        stored = 0.5 * stiffness * (angle[end] ** 2 - angle[begin] ** 2)
+        taken = way * moment * (angle[end] - angle[begin]) + path.dissipation[end] - path.dissipation[begin]
+        # Trapezoids between rows; the slight shortening of the bar stores next to nothing.
+        assert work == pytest.approx(stored + taken, abs=2e-3 * stiffness * angle.max() ** 2)
+    assert angle[-1] == pytest.approx(moment / stiffness, abs=1e-6)
+    if friction == 0.0:
+        last = None
+        for row, parameter in zip(path.equilibria, parameters.tolist(), strict=True):
+            last = sr.solve_equilibrium(model, [], environment=ball.at(parameter), previous=last)
+            assert row.q_springs == pytest.approx(last.q_springs, abs=1e-9)
+    again = sr.follow_contact(
+        model, [], environment=ball, friction=friction, parameters=parameters[:5], start=path.equilibria[0]
+    )
+    assert again.equilibria[-1].q_springs == pytest.approx(path.equilibria[4].q_springs, abs=1e-9)
+
+
+def test_friction_of_guides_in_contact_is_refused_by_name() -> None:
+    model = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1, guide_friction=0.1))
+    with pytest.raises(
+        sr.ParameterError, match="without dry friction, for paths in contact of robots that grow, or with friction in"
+    ):
+        sr.follow_contact(model, model.relaxed_motors, environment=sr.Environment([]), friction=0.1)

@@ -143,6 +143,20 @@ def test_the_change_is_orthogonal_to_what_does_not_move_the_tip(muscles: str, rn
         assert np.linalg.norm(change) <= np.linalg.norm((goal - start) / scale) + 1e-6
 
 
+def test_given_tensions_keep_the_limits_of_lengths_where_they_push_too(rng: np.random.Generator) -> None:
+    """Targets that random tensions reach: least change alone goes beyond the lengths of two of them (within_limits false)."""
+    arm = sr.load_model(
+        sr.PccArm(
+            kind="tension", segment_lengths=(0.5, 0.5), elastic_sections=1, muscle_contraction=0.08, muscle_extension=0.08
+        )
+    )
+    for _ in range(3):
+        target = sr.solve_equilibrium(arm, rng.uniform(-60.0, 60.0, 6)).tip_position
+        found = sr.solve_ik(arm, target)
+        assert found.equilibrium.within_limits
+        assert np.linalg.norm(found.equilibrium.tip_position - target) < POSITION
+
+
 def tip_of(lengths: np.ndarray) -> np.ndarray:
     """Unloaded tip of the paper's arm in closed form."""
     tip: np.ndarray = chain_transform(arc_from_muscles(lengths.reshape(-1, 3), 0.04))[:3, 3]

@@ -107,8 +107,8 @@ def solve_ik(
     the change is minimal; if it has muscles, the first search that succeeds decides, as it does among obstacles. Where
     muscles cannot both pull and push (a least tension of zero or more), the limits of all tensions and lengths are kept,
     too, and redundant ones get the least tension instead: a minimum of the sum of squares beyond their pretension
-    (`statics.tip_steps`), also where lengths are given (`statics.tip_goal.LoadedTip.begin`). Lengths of given tensions that
-    pull and push may be beyond their limits, which `Equilibrium.within_limits` tells.
+    (`statics.tip_steps`), also where lengths are given (`statics.tip_goal.LoadedTip.begin`). Given tensions that pull and push
+    keep the limits of lengths, and change least.
 
     For full poses of a robot with a spherical wrist the arm first puts the centre of the wrist in place, and the wrist starts
     in the orientation, with both of its solutions (`statics.spherical_wrist`).
@@ -158,7 +158,7 @@ def solve_ik(
     def allowed(local: LocalSolution[ElasticState]) -> bool:
         return elbow is None or elbow_side(model, local.state.q) == elbow
 
-    tip = LoadedTip(model, goal, load, method)
+    tip = LoadedTip(model, goal, load, method, first)
     ended: list[LocalSolution[ElasticState]] = []
     begins = _starts(model, first, positive_integer("starts", starts, 10_000))
     first_decides = environment is not None or bool(model.muscles and freedom > goal.rows)

@@ -21,7 +21,7 @@ from softrobots.statics.kinematics import frame_jacobian, frame_placement
 from softrobots.statics.loads import Load
 from softrobots.statics.sensitivity import inverse_in_contact, tip_motion
 from softrobots.statics.tip_search import LEVER, LocalSolution, search
-from softrobots.statics.tip_steps import Pull, TipModel, given_tensions, muscle_room, taken_up
+from softrobots.statics.tip_steps import Pull, TipModel, given_tensions, keeps_muscles, muscle_room, taken_up
 
 _MOST_OPENED = 4  # pressed contacts beyond which each opens alone, or all of them
 
@@ -138,6 +138,8 @@ class LoadedTip:
     """The load."""
     method: str = "newton"
     """Solver of the springs, one of `elastostatics.METHODS`."""
+    home: FloatArray | None = None
+    """Actuators to which given tensions that pull and push return, shape (n_motors,); None: they move least."""
 
     @property
     def rows(self) -> int:
@@ -207,8 +209,8 @@ class LoadedTip:
         return released(state, pressed, motors, springs, held, damping)
 
     def pull(self, state: ElasticState, follow: FloatArray) -> Pull | None:
-        """Return the tensions with their derivatives; None of muscles of given length that push."""
-        if not self.model.actuators.least_tension:
+        """Return the tensions with their derivatives; None of muscles that push, whose tensions are not given."""
+        if not keeps_muscles(self.model):
             return None
         model, count = self.model, len(self.model.muscles)
         by_motors, by_elastic = motor_slopes(state, self.load)
@@ -221,8 +223,11 @@ class LoadedTip:
             elongations, stretch = paths.elongation, (paths.arms @ follow)[rows] / rests[:, None]
         tensions, scale = state.load.motors[-count:], model.actuators.tension_scale
         limited = np.concatenate([slope / scale, stretch])
-        beyond = (tensions - model.actuators.wanted_tensions) / scale
-        return Pull(beyond, slope / scale, muscle_room(model, tensions, elongations), limited)
+        wanted, own = model.actuators.wanted_tensions, np.full(count, scale)
+        if not model.actuators.least_tension:  # they change least instead
+            wanted, own[rows] = np.array(tensions), model.motor_scale[-count:][rows]
+            wanted[rows] = wanted[rows] if self.home is None else self.home[-count:][rows]
+        return Pull((tensions - wanted) / own, slope / own[:, None], muscle_room(model, tensions, elongations), limited)
 
 
 def checked_orientation(value: Any) -> FloatArray | None:

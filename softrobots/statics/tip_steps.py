@@ -77,6 +77,11 @@ def given_tensions(model: SoftModel) -> tuple[NDArray[np.intp], FloatArray]:
     return rows, np.array([muscle.rest_length for muscle in model.muscles])[rows]
 
 
+def keeps_muscles(model: SoftModel) -> bool:
+    """Return whether limits of muscles are kept beside those of what is given: they only pull, or tensions are given."""
+    return bool(model.actuators.least_tension or len(given_tensions(model)[0]))
+
+
 def muscle_room(model: SoftModel, tensions: FloatArray, elongations: FloatArray) -> FloatArray:
     """Return the room to the limits of muscles, from the least to the value and on to the largest, negative beyond them.
 
@@ -97,7 +102,7 @@ def muscle_room(model: SoftModel, tensions: FloatArray, elongations: FloatArray)
 
 
 def taken_up(model: SoftModel, q_motors: FloatArray, state: ElasticState) -> tuple[FloatArray, float]:
-    """Return actuators with the slack of tendons taken up, and how far a muscle is beyond its limits; 0 of those that push.
+    """Return actuators with the slack of tendons taken up, and how far a muscle is beyond its limits; 0 without such.
 
     Args:
         model: The robot.
@@ -105,7 +110,7 @@ def taken_up(model: SoftModel, q_motors: FloatArray, state: ElasticState) -> tup
         state: The robot in equilibrium there.
     """
     actuators, structure = model.actuators, model.structure
-    if not actuators.least_tension:
+    if not keeps_muscles(model):
         return q_motors, 0.0
     elongations = structure.muscle_paths.at(structure.strains(q_motors, state.q_springs)).elongation
     room = muscle_room(model, state.load.motors[len(q_motors) - len(elongations) :], elongations)

@@ -24,7 +24,7 @@ from softrobots.statics.loads import Load
 from softrobots.statics.tip_force.force_search import Directions, search_force, torque_tolerance
 from softrobots.statics.tip_goal import Goal, LoadedTip
 from softrobots.statics.tip_search import LocalSolution, advance, search
-from softrobots.statics.tip_steps import Pull, TipModel, taken_up
+from softrobots.statics.tip_steps import Pull, TipModel, keeps_muscles, taken_up
 
 _ROUNDING = 1e-9  # by which a motor may be beyond its limits [rad, m or N]
 
@@ -115,8 +115,8 @@ class LoopedSearch:
         tolerance: float,
     ) -> tuple[Status, LocalSolution[ChainState]]:
         """Find actuators that put the tip within the tolerance [m] of a target, from given ones and elastic coordinates."""
-        tip = _SoughtTip(self, force, gravity, target)
         first = self.model.actuators.go(q_motors, np.zeros(len(q_motors)))  # within the limits
+        tip = _SoughtTip(self, force, gravity, target, first)
         first, start = tip.loaded.begin(first, start, tolerance)
         status, state = self.settle(first, force, gravity, start)
         found = search(tip, first, start, tolerance=tolerance) if status == Status.CERTIFIED else None
@@ -247,6 +247,7 @@ class _SoughtTip:
     force: FloatArray
     gravity: FloatArray
     target: FloatArray
+    home: FloatArray | None = None
 
     @property
     def model(self) -> SoftModel:
@@ -266,7 +267,7 @@ class _SoughtTip:
         if status != Status.CERTIFIED:
             return None
         excess = 0.0
-        if self.model.actuators.least_tension or self.model.structure.friction is not None:
+        if keeps_muscles(self.model) or self.model.structure.friction is not None:
             rubbing = gripping(self.model, self.chain.run.layout, state.w)
             pulled = elastic_state(rubbing, q_motors, state.q_springs, self.loaded.load)
             taut, excess = taken_up(self.model, q_motors, pulled)
@@ -278,7 +279,7 @@ class _SoughtTip:
     @property
     def loaded(self) -> LoadedTip:
         """The same on Pinocchio, for the derivatives of tensions."""
-        return LoadedTip(self.model, Goal(self.target), Load.of(self.model, force=self.force, gravity=self.gravity))
+        return LoadedTip(self.model, Goal(self.target), Load.of(self.model, self.force, gravity=self.gravity), home=self.home)
 
     def missing(self, state: ChainState) -> FloatArray:
         return np.asarray(self.target - self.chain.tip(state.w))
@@ -289,7 +290,7 @@ class _SoughtTip:
         return [] if pulled is None else self.loaded.released(LocalSolution(here.q_motors, pulled, here.error), held, damping)
 
     def pull(self, state: ChainState, follow: FloatArray) -> Pull | None:
-        """Return the tensions with their derivatives; None of muscles of given length that push."""
+        """Return the tensions with their derivatives; None of muscles that push, whose tensions are not given."""
         return None if state.pulled is None else self.loaded.pull(state.pulled, follow)
 
     def motion(self, state: ChainState) -> tuple[FloatArray, FloatArray]:

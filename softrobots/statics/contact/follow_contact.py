@@ -13,7 +13,7 @@ from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.core.progress import with_progress
 from softrobots.environment.environment import check_environment
 from softrobots.environment.standing import standing_among
-from softrobots.model.friction_coordinates import check_frictionless
+from softrobots.model.friction_coordinates import check_frictionless, untouched
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_path import ContactJump, ContactPath
 from softrobots.statics.contact.contact_walk import ContactWalk
@@ -81,7 +81,8 @@ def follow_contact(
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range, rows differ in number, `start` has
-            other motors than the first row or is out of balance there, or the robot has dry friction of its own.
+            other motors than the first row or is out of balance there, or the robot has dry friction of its own and grows, or
+            in guides.
         NameNotFound: If a frame does not exist.
         EquilibriumNotFound: If there is no equilibrium at the first parameter, or the robot comes to no rest; `best` is then
             the path so far.
@@ -137,7 +138,9 @@ class Course:
         if self._grown is not None and given is None:
             raise ParameterError("parameters", None, "given, for a robot that is a function of them")
         first = model if self._grown is None else self._grown(float(given[0]))  # type: ignore[index]
-        self._model = check_frictionless(first, "friction at contacts")
+        self._model = untouched(first)
+        if self._grown is not None or first.structure.guided:  # friction of guides follows the tensions
+            check_frictionless(first, "paths in contact of robots that grow, or with friction in guides")
         rows = first.actuators.in_order(q_motors, "q_motors")
         columns: dict[str, Any] = {"q_motors": (rows, first.n_motors, first.actuators.described)}
         for name, value in loads.items():
@@ -173,7 +176,11 @@ class Course:
     def at(self, place: float) -> Given:
         """Return what is given at a place."""
         parameter = self.parameter(place)
-        model = self._model if self._grown is None else check_frictionless(self._grown(parameter), "friction at contacts")
+        model = (
+            self._model
+            if self._grown is None
+            else check_frictionless(self._grown(parameter), "paths in contact of robots that grow")
+        )
         row = {name: _between(rows, place) for name, rows in self._columns.items()}
         wrench = {key: row[name] for name, key in self._frames.items()} or row.get("wrench")
         load = Load.of(model, row.get("force"), wrench=wrench, frame=self._frame, gravity=row.get("gravity"))

@@ -19,6 +19,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.environment.gaps import Surroundings
 from softrobots.environment.swept import may_pass
+from softrobots.model.friction_coordinates import after_step
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_laws import Balance
 from softrobots.statics.contact.coulomb import GAP, solve_step
@@ -94,6 +95,8 @@ def settle(
 def at_rest(given: Given, start: Equilibrium, friction: float) -> Rest | None:
     """Return an equilibrium, whose contacts keep their forces, as the rest from which friction counts; None if it is none."""
     gaps = given.surroundings.at(start.q, MARGIN * given.model.reach)
+    if given.model.structure.friction is not None:
+        given = given._replace(model=after_step(start.model, start.q_motors, start.q_springs))
     return settle(given, Sliding(friction, gaps, forces_of(gaps, start.contacts)), start.q_springs)
 
 
@@ -103,7 +106,7 @@ def step(given: Given, last: Rest, *, patient: bool = True) -> Rest | None:
     One that full Newton steps do not find is looked for only with `patient`.
     """
     sliding, start = carried_over(given, last)
-    there = settle(given, sliding, start, patient=patient)
+    there = settle(remembering_rest(given, last), sliding, start, patient=patient)
     if there is None or change(given.model, there.q_springs, start) > FAR or may_have_passed(there.robot, last):
         return None
     return there
@@ -129,6 +132,7 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
     model, (sliding, here), state = given.model, carried_over(given, last), last
     brake, work = 1.0, 0.0
     for _ in range(_MOST_MOMENTS):
+        given = remembering_rest(given, state)
         there = settle(given, sliding, here, brake) or settle(given, let_go(sliding), here, brake)
         moved = np.inf if there is None else change(model, there.q_springs, here)
         if there is None or moved > _FAR_MOVING or may_have_passed(there.robot, state):
@@ -139,7 +143,7 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
         work += there.work
         sliding, here, state = there.sliding, there.q_springs, there
         if moved < _NEARLY_AT_REST:
-            rest = settle(given, sliding, here)
+            rest = settle(remembering_rest(given, state), sliding, here)
             if rest is not None and change(model, rest.q_springs, here) < _NEARLY_AT_REST:
                 return rest._replace(work=work + rest.work)
             if moved < _STANDS:  # on an equilibrium that does not hold: a small push along its softest motion
@@ -189,6 +193,12 @@ def energy_drop(given: Given, last: Rest, rest: Rest) -> float:
 def change(model: SoftModel, there: FloatArray, here: FloatArray) -> float:
     """Return the size of a change of springs, relative to the mean stiffness of the springs."""
     return float(np.linalg.norm(np.sqrt(model.stiffness / model.stiffness.mean()) * (there - here)))
+
+
+def remembering_rest(given: Given, last: Rest) -> Given:
+    """Return what is given, for a robot with dry friction of its own with what that remembers of a rest."""
+    model = after_step(last.robot.model, last.robot.given.q_motors, last.q_springs)
+    return given if given.model.structure.friction is None else given._replace(model=model)
 
 
 def carried_over(given: Given, last: Rest) -> tuple[Sliding, FloatArray]:
