@@ -2,34 +2,51 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
+from softrobots.compiled.motion.held_motion import moving_coordinates
+from softrobots.compiled.program.motion_program import make_motion_program
+from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
-from softrobots.compiled.run.compiled_steps import CompiledSteps
+from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
+from softrobots.compiled.run.friction_states import with_sliders
 from softrobots.compiled.run.motion_batch import MotionBatch
 from softrobots.compiled.run.motion_cases import MotionCases
-from softrobots.compiled.run.motion_course import Course
+from softrobots.compiled.run.motion_course import Course, SpringKicks
+from softrobots.compiled.run.motion_damping import MotionDamping
 from softrobots.compiled.run.motion_replay import replay
-from softrobots.compiled.run.motion_results import CompiledMotion, check_batch, check_motion
+from softrobots.compiled.run.motion_results import CompiledMotion, StepEnd, check_batch, check_motion
 from softrobots.compiled.run.motion_runs import StepsTaken, first_grid, halve_to_tolerance, take_batch, take_one
-from softrobots.core.checks import FloatArray, positive_integer, positive_number
+from softrobots.compiled.statuses import Status
+from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
+from softrobots.core.errors import NotConverged
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.step_control import order_of_steps
 from softrobots.dynamics.time_grid import grid_with_stops, steps_and_rows
 from softrobots.dynamics.time_inputs import MOST_KINKS, MotorPath, TimeLoad
+from softrobots.model.friction_coordinates import check_frictionless
 
 _COMPARED = 401  # times at which tips of two runs are compared, besides those of the rows
 
 
-class CompiledDynamics(CompiledSteps):
+class CompiledDynamics(CompiledStatics):
     """Compiled motion of a robot, for single cases and for batches.
 
     See `softrobots.compiled.run.compiled_model.CompiledModel`, which adds load estimation and inverse kinematics.
     """
+
+    def __init__(self, *given: Any) -> None:
+        """Generate and load the code, see `CompiledStatics`; call `softrobots.compile` instead."""
+        super().__init__(*given)
+        self._motion_runs: dict[tuple[bool, int], Any] = {}
+        self._moving = list(moving_coordinates(self._unknowns))
+        self._damping = MotionDamping(self._model, self._unknowns.strains, self._moving)
+        self._spring_kicks = SpringKicks(self._model, self._moving, self._unknowns.strains, self._actuation)
 
     def simulate(
         self,
@@ -83,18 +100,14 @@ class CompiledDynamics(CompiledSteps):
             "tolerance": None if h is not None else largest,
             "tip_error": None,
         }
-        first = self._first_state(course, start)
-        elastic = first.x[self._motors :], first.rates[self._motors :]
-        state = elastic[0][self._moving], elastic[1][self._moving]
+        first = course.first_state(self._model, start)
+        (u, y), (du, dy) = ((one[: self._motors], one[self._motors :][self._moving]) for one in (first.x, first.rates))
         if first.memory is not None:
-            at = (first.x[: self._motors], state[0], first.rates[: self._motors], state[1])
-            given.append(
-                (run.layout.sliders, self._spring_kicks.carried(self._actuation.sliders(first.memory.bending[None])[0], *at))
-            )
+            given.append((run.layout.sliders, self._spring_kicks.carried(first.memory.bending, u, y, du, dy)))
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
         def take(grid: FloatArray) -> StepsTaken:
-            return take_one(run, state, given, course, grid, times, progress, h is None)
+            return take_one(run, (y, dy), given, course, grid, times, progress, h is None)
 
         if h is not None:
             taken = take(grid_with_stops(end, h, *course.breaks))
@@ -105,7 +118,7 @@ class CompiledDynamics(CompiledSteps):
         down = None if gravity is None else tuple(gravity_vector(gravity).tolist())
 
         def again(steps: FloatArray, row_times: FloatArray) -> Motion:
-            ends = take_one(run, state, given, course, steps, steps)
+            ends = take_one(run, (y, dy), given, course, steps, steps)
             if ends.interrupted:
                 raise KeyboardInterrupt
             if ends.failure is not None:
@@ -118,9 +131,70 @@ class CompiledDynamics(CompiledSteps):
         known = course.inputs_at(rows[: len(found)], taken.grid) | facts | {"gravity": down, "interrupted": taken.interrupted}
         if path.constant and len(found) == len(rows):
             known["tip_position"] = np.ascontiguousarray(found[:, -3:])
-        motion = CompiledMotion(again, model=self._remembering(taken.sliders), q_springs=springs, velocities=rates, **known)
+        known["model"] = with_sliders(self._actuation, taken.sliders)
+        motion = CompiledMotion(again, q_springs=springs, velocities=rates, **known)
         check_motion(motion, taken, end)
         return motion
+
+    def step(
+        self,
+        q_springs: Any,
+        velocities: Any,
+        q_motors: Any,
+        force: Any = NO_FORCE,
+        *,
+        time_step: Any = 1e-3,
+        gravity: Any = None,
+        damping_time: Any = None,
+        mass_damping: Any = 0.0,
+        order: Any = 2,
+    ) -> StepEnd:
+        """Take one step of time from a state, for an observer or a controller; `c_source(motion=True)` has it in C.
+
+        Args:
+            q_springs: Elastic coordinates at the beginning, shape (n_springs,) [rad or m].
+            velocities: Their rates, shape (n_springs,) [rad/s or m/s].
+            q_motors: Actuators, shape (n_motors,) [rad, m or N] if they stand still, or (3, n_motors): at the beginning, in the
+                middle and at the end of the step.
+            force: Force on the tip in the middle of the step, shape (3,) [N], world axes.
+            time_step: Length of the step [s].
+            gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
+            damping_time: Damping of the elastic coordinates over their stiffness [s]; None: the damping of the description.
+            mass_damping: Rayleigh's factor of the mass matrix, which is that of the relaxed robot at all times [1/s].
+            order: Order of the error in the length of the step: 2, or 4 for motors that stand still.
+
+        Returns:
+            The state at the end.
+
+        Raises:
+            ParameterError: If an argument has the wrong shape, is not finite or out of range, or its actuators are refused.
+            NotConverged: If the step fails, even in small parts; `best` is None.
+        """
+        check_frictionless(self._model, "single steps (simulate and C code take that of segments)")
+        scheme = order_of_steps(order, time_step, self._model, np.ndim(q_motors) < 2)
+        run, given, _ = self._motion_code(gravity, damping_time, mass_damping, scheme)
+        layout, n, moving = run.layout, self._model.n_springs, self._moving
+        q_motors = self._model.actuators.in_order(q_motors, "q_motors")
+        path: Any = [q_motors] * 3 if np.ndim(q_motors) < 2 else finite_array("q_motors", q_motors, (3, self._motors), "rad")
+        path = [self._actuation.checked(one) for one in path]
+        state = finite_array("q_springs", q_springs, (n,), "rad"), finite_array("velocities", velocities, (n,), "rad/s")
+        w = run.workspace()
+        for place, values in [
+            *given,
+            (layout.position, state[0][moving]),
+            (layout.velocity, state[1][moving]),
+            (layout.force, finite_array("force", force, (3,), "N")),
+            (layout.time_step, np.array([positive_number("time_step", time_step, "s")])),
+            (layout.motors_begin, np.concatenate(path)),
+        ]:
+            run.put(w, place, values)
+        status = Status(run.motion_step(w))
+        if status != Status.CERTIFIED:
+            why = f"the step of {time_step} s fails, even in small parts: {status.explanation}"
+            raise NotConverged(why, best=None, residual=math.inf, iterations=1)
+        run.place_at(w, 1.0)
+        springs, rates = self._elastic_state(np.array(w[layout.position : layout.position + 2 * layout.unknowns]))
+        return StepEnd(read_only(springs), read_only(rates), read_only(np.array(w[layout.tip : layout.tip + 3])))
 
     def simulations(
         self,
@@ -180,7 +254,7 @@ class CompiledDynamics(CompiledSteps):
         cases.kick(spring_kicks, 0.0, slice(None), springs, rates)
         values = [(run.layout.position, springs), (run.layout.velocity, rates), *((place, one[None]) for place, one in given)]
         if run.layout.rubbing:
-            values.insert(2, (run.layout.sliders, cases.carried(spring_kicks, self._actuation, springs, rates)))
+            values.insert(2, (run.layout.sliders, cases.carried(spring_kicks, springs, rates)))
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
         def take(grid: FloatArray) -> StepsTaken:
@@ -195,10 +269,30 @@ class CompiledDynamics(CompiledSteps):
         fail(taken.status, cases.bad, [], [found])
         tips, asked = np.ascontiguousarray(found[..., -3:]), None if h is not None else largest
         springs, rates = self._elastic_state(found[..., :-3])
-        rubbing = taken.sliders if run.layout.rubbing else None
-        bending = None if rubbing is None else self._actuation.bending(np.nan_to_num(rubbing))
-        batch = MotionBatch(
-            rows, springs, rates, tips, taken.status, taken.grid, taken.errors, asked, taken.interrupted, bending
-        )
+        bending = None if taken.sliders is None else self._actuation.bending(np.nan_to_num(taken.sliders))
+        facts = taken.status, taken.grid, taken.errors, asked, taken.interrupted, bending
+        batch = MotionBatch(rows, springs, rates, tips, *facts)
         check_batch(batch, taken, cases.failures)
         return batch
+
+    def _motion_code(self, gravity: Any, damping_time: Any, mass_damping: Any, order: int) -> tuple[Any, Any, FloatArray]:
+        """Return the code, what stands in its workspace of gravity and damping, and the damping of the elastic coordinates."""
+        down = gravity_vector(gravity)
+        alpha = non_negative_number("mass_damping", mass_damping, "1/s")
+        beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
+        full = alpha > 0.0
+        if (full, order) not in self._motion_runs:
+            program = make_motion_program(self._unknowns, full_damping=full, order=order)
+            self._motion_runs[full, order] = make_run(program, self._backend)
+        run = self._motion_runs[full, order]
+        given = [*self._damping.inputs(run.layout, beta, alpha), (run.layout.gravity, down)]
+        return run, given, self._damping.matrix(beta, alpha)
+
+    def _elastic_state(self, state: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Return elastic coordinates and rates, each shape (..., n_springs), from unknowns and their rates."""
+        n, count = state.shape[-1] // 2, self._model.n_springs
+        if n == count:
+            return state[..., :n].copy(), state[..., n:].copy()
+        springs, rates = np.tile(self._model.rest, (*state.shape[:-1], 1)), np.zeros((*state.shape[:-1], count))
+        springs[..., self._moving], rates[..., self._moving] = state[..., :n], state[..., n:]
+        return springs, rates

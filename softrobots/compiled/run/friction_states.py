@@ -88,6 +88,13 @@ def remembered(actuation: Actuation, before: StatesBefore) -> SoftModel:
     return remembering(actuation.model, FrictionMemory(bending, before.anchors[0], pieces))
 
 
+def with_sliders(actuation: Actuation, sliders: FloatArray | None) -> SoftModel:
+    """Return the robot of the general solver with sliders of segments, shape (1, n_unknowns); as it is without friction."""
+    if sliders is None:
+        return actuation.model
+    return remembered(actuation, StatesBefore(sliders, sliders, np.zeros((1, 0)), None))
+
+
 def gripping(model: SoftModel, layout: Any, w: Any) -> SoftModel:
     """Return such a robot with the friction of a state that was found, as a search leaves it: see `slipping`."""
     if not layout.rubbing:

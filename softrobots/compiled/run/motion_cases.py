@@ -70,14 +70,14 @@ class MotionCases:
         self.state = without_dust(without(springs, self.bad, model.rest)), without_dust(without(rates, self.bad))
         """Elastic coordinates and rates at the start, each shape (n, n_springs)."""
 
-    def carried(self, kicks: SpringKicks, actuation: Actuation, unknowns: FloatArray, rates: FloatArray) -> FloatArray:
+    def carried(self, kicks: SpringKicks, unknowns: FloatArray, rates: FloatArray) -> FloatArray:
         """Return what code of robots with dry friction carries, shape (n, 3 N), from unknowns and rates after a first kick."""
-        sliders, carried = actuation.sliders(self._bending.reshape(self.count, -1, 2)), []
+        bending, carried = self._bending.reshape(self.count, -1, 2), []
         for case in range(self.count):
             path = self._paths[min(case, len(self._paths) - 1)] if self._paths else None
             motors = self._motors[case] if path is None else path(0.0)
             speeds = 0.0 * motors if path is None else path.kicks.get(0.0, 0.0 * motors)
-            carried.append(kicks.carried(sliders[case], motors, unknowns[case], speeds, rates[case]))
+            carried.append(kicks.carried(bending[case], motors, unknowns[case], speeds, rates[case]))
         return np.array(carried)
 
     @property

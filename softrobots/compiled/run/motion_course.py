@@ -8,10 +8,14 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.compiled.run.actuation import Actuation
+from softrobots.compiled.run.batches import without_dust
 from softrobots.compiled.settings import LARGEST_POSITION
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.equations import EquationsOfMotion
+from softrobots.dynamics.midpoint import State
+from softrobots.dynamics.starting import first_kick, first_state
 from softrobots.dynamics.step_control import halved
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
@@ -51,9 +55,11 @@ def motors_at(path: MotorPath, times: FloatArray, grid: FloatArray) -> tuple[Flo
 class SpringKicks:
     """What springs do when velocities of motors jump; see `MidpointRule.kicked`."""
 
-    def __init__(self, model: SoftModel, moving: Sequence[int], strains: Sequence[int]) -> None:
-        """Take the robot, which elastic coordinates can move, and its strains that are not locked."""
-        self._model, self._moving, self._strains = model, list(moving), list(strains)
+    def __init__(self, model: SoftModel, moving: Sequence[int], strains: Sequence[int], actuation: Actuation) -> None:
+        """Take the robot, which elastic coordinates can move, its strains that are not locked, and its maps."""
+        self._model, self._strains, self._actuation = model, list(strains), actuation
+        self.moving = list(moving)
+        """The elastic coordinates that can move."""
         self._equations: EquationsOfMotion | None = None
 
     def at(self, motors: FloatArray, unknowns: FloatArray, change: FloatArray) -> FloatArray:
@@ -64,14 +70,14 @@ class SpringKicks:
             unknowns: The unknowns there, shape (n,) [rad or m].
             change: Jump of the velocities of the motors, shape (n_motors,).
         """
-        x, free = self._all(motors, unknowns, self._model.rest), self._model.n_motors + np.array(self._moving, dtype=np.intp)
+        x, free = self._all(motors, unknowns, self._model.rest), self._model.n_motors + np.array(self.moving, dtype=np.intp)
         mass = self._of_robot.mass_matrix(x)
         return np.asarray(-np.linalg.solve(mass[np.ix_(free, free)], mass[free, : len(change)] @ change))
 
-    def carried(self, sliders: FloatArray, motors: FloatArray, unknowns: FloatArray, *rates: FloatArray) -> FloatArray:
-        """Return what code with dry friction carries, sliders, strains and rates (3 N); `rates` of motors and unknowns."""
+    def carried(self, bending: FloatArray, motors: FloatArray, unknowns: FloatArray, *rates: FloatArray) -> FloatArray:
+        """Return what code with dry friction carries, sliders, strains and rates (3 N), from the bending that it remembers."""
         strains = self._of_robot.strains(self._all(motors, unknowns, self._model.rest))[self._strains]
-        return np.concatenate([sliders, strains, self.strain_rates(motors, unknowns, *rates)])
+        return np.concatenate([self._actuation.sliders(bending[None])[0], strains, self.strain_rates(motors, unknowns, *rates)])
 
     def strain_rates(self, motors: FloatArray, unknowns: FloatArray, motor_rates: FloatArray, rates: FloatArray) -> FloatArray:
         """Return the rates of the strains, shape (N,), from places and rates of motors and unknowns."""
@@ -87,7 +93,7 @@ class SpringKicks:
     def _all(self, motors: FloatArray, unknowns: FloatArray, others: FloatArray) -> FloatArray:
         """Return motors and all elastic coordinates, or their rates."""
         springs = np.array(others)
-        springs[self._moving] = unknowns
+        springs[self.moving] = unknowns
         return np.concatenate([motors, springs])
 
 
@@ -106,6 +112,17 @@ class Course:
     def breaks(self) -> tuple[FloatArray, ...]:
         """Times at which velocities of motors jump, then jumps and kinks of motors and of the force, each shape (n,) [s]."""
         return self.path.kick_times, self.path.breaks, self.load.breaks
+
+    def first_state(self, model: SoftModel, start: Any) -> State:
+        """Return the state at time zero, after the motors have begun to move, see `softrobots.dynamics.starting`."""
+        first, m = first_state(model, start, self.path), model.n_motors
+        first.x[m:], first.rates[m:] = without_dust(first.x[m:]), without_dust(first.rates[m:])
+        change = first_kick(self.path, first.rates[:m])
+        if change is not None:
+            places = m + np.array(self.spring_kicks.moving, dtype=np.intp)
+            first.rates[places] += self.spring_kicks.at(first.x[:m], first.x[places], change)
+            first.rates[:m] += change
+        return first
 
     def inputs_at(self, time: FloatArray, grid: FloatArray) -> dict[str, Any]:
         """Return the fields of a `Motion` with rows at given times, shape (n,) [s], that the steps of a grid do not compute."""

@@ -61,19 +61,6 @@ class StepEnd(NamedTuple):
     """The tip, shape (3,) [m], world axes."""
 
 
-class RubbingStepEnd(NamedTuple):
-    """The same of a robot with dry friction."""
-
-    q_springs: FloatArray
-    """Elastic coordinates, shape (n_springs,) [rad or m]."""
-    velocities: FloatArray
-    """Their rates, shape (n_springs,) [rad/s or m/s]."""
-    tip_position: FloatArray
-    """The tip, shape (3,) [m], world axes."""
-    friction_bending: FloatArray
-    """Bending that friction remembers, shape (n_sections, 2) [rad]."""
-
-
 def check_motion(motion: Motion, taken: StepsTaken, duration: float) -> None:
     """Refuse a motion that is not whole, unless Ctrl-C ended it.
 

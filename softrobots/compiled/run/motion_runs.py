@@ -186,11 +186,9 @@ def take_batch(
 
     `given` has positions, velocities, of dry friction sliders, strains and rates, and what is the same for all cases.
     """
-    n, strains, given = (
-        run.layout.unknowns,
-        run.layout.strain_begin - run.layout.sliders,
-        [*given, *((place, bound[None]) for place, bound in _bound(run, grid, compared))],
-    )
+    layout, bound = run.layout, _bound(run, grid, compared)
+    n, strains = layout.unknowns, layout.strain_begin - layout.sliders
+    given = [*given, *((place, one[None]) for place, one in bound)]
     out, sliders = np.full((cases.count, len(times), 2 * n + 3), np.nan), np.zeros((cases.count, strains))
     statuses = np.full(cases.count, Status.UNSETTLED, dtype=np.uint8)  # until a case is at its end
     places = tuple(place for place, _ in given)
@@ -228,7 +226,7 @@ def take_batch(
             list(with_progress(done, progress, label=f"motions, {len(grid) - 1} steps", unit="block", total=len(blocks)))
         except KeyboardInterrupt:
             stopped.set()
-    return StepsTaken(grid, out, statuses, stopped.is_set(), sliders=sliders)
+    return StepsTaken(grid, out, statuses, stopped.is_set(), sliders=sliders if strains else None)
 
 
 def _stops(grid: FloatArray, kicks: FloatArray) -> set[int]:
