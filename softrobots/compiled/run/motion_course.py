@@ -117,9 +117,11 @@ class Course:
         """Return the state at time zero, after the motors have begun to move, see `softrobots.dynamics.starting`."""
         first, m = first_state(model, start, self.path), model.n_motors
         first.x[m:], first.rates[m:] = without_dust(first.x[m:]), without_dust(first.rates[m:])
+        places = m + np.array(self.spring_kicks.moving, dtype=np.intp)
+        locked = np.setdiff1d(np.arange(m, len(first.x)), places)
+        first.x[locked], first.rates[locked] = model.rest[locked - m], 0.0
         change = first_kick(self.path, first.rates[:m])
         if change is not None:
-            places = m + np.array(self.spring_kicks.moving, dtype=np.intp)
             first.rates[places] += self.spring_kicks.at(first.x[:m], first.x[places], change)
             first.rates[:m] += change
         return first
