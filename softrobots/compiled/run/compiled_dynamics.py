@@ -41,7 +41,7 @@ class CompiledDynamics(CompiledStatics):
     """
 
     def __init__(self, *given: Any) -> None:
-        """Generate and load the code, see `CompiledStatics`; call `softrobots.compile` instead."""
+        """Read the robot, see `CompiledStatics`; call `softrobots.compile` instead."""
         super().__init__(*given)
         self._motion_runs: dict[tuple[bool, int], Any] = {}
         self._moving = list(moving_coordinates(self._unknowns))
