@@ -14,9 +14,14 @@ from softrobots.compiled import Status
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.motion.motion_groups import motion_groups
 from softrobots.compiled.program.motion_program import make_motion_program
+from softrobots.compiled.run import motion_runs
 from softrobots.compiled.run.backends import make_run
+from softrobots.compiled.run.motion_course import Course, SpringKicks
+from softrobots.compiled.run.motion_runs import take_one
+from softrobots.dynamics import gauss
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import MotionState
+from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
 from tests.support.c_libraries import Controller
@@ -230,3 +235,75 @@ def test_rayleigh_damping_of_long_chains_is_that_of_simulate(kind: str, order: i
     assert np.abs(slow.energy.dissipated).max() > 0.1 * slow.energy.kinetic.max()
     # Steps are solved to 1e-13 rad.
     np.testing.assert_allclose(fast.q_springs, slow.q_springs, rtol=0, atol=1e-9 * np.abs(slow.q_springs).max() + 1e-12)
+
+
+@pytest.mark.parametrize("kind", ["rod", "foreign", "helix_lumped", "sections"])
+def test_both_matrices_of_a_step_of_fourth_order_have_one_solution(kind: str) -> None:
+    """Equations do not depend on the matrix that solves them: the ends are those of `simulate`, to its 1e-13 a step."""
+    model, rng, h, steps = LONG[kind](), np.random.default_rng(4), 2e-3, 3
+    springs, rates = model.rest + 5e-3 * rng.normal(size=model.n_springs), 0.05 * rng.normal(size=model.n_springs)
+    motors, force = 0.2 * rng.normal(size=model.n_motors), (0.1, -0.2, 0.1)
+    start = MotionState(model, 0.0, motors, np.zeros(model.n_motors), springs, rates)
+    given = {"gravity": GRAVITY, "damping_time": 1e-3, "time_step": h, "order": 4}
+    expected = sr.simulate(model, steps * h, motors, start=start, force=force, **given).q_springs[-1]
+    run: Any = make_run(make_motion_program(Unknowns(model.chain()), order=4), "python")
+    for coupled in (0.0, 1.0):
+        w, layout = run.workspace(), run.layout
+        values = {"position": springs, "velocity": rates, "damping": 1e-3 * model.chain().stiffness, "force": np.array(force)}
+        values |= {"gravity": np.array(GRAVITY), "time_step": np.array([h]), "coupled": np.array([coupled])}
+        values |= {f"motors_{when}": motors for when in ("begin", "middle", "end")}
+        for name, value in values.items():
+            run.put(w, getattr(layout, name), value)
+        for _ in range(steps):
+            assert run.motion_step(w) == Status.CERTIFIED
+        found = np.array(w[layout.position : layout.position + layout.unknowns])
+        np.testing.assert_allclose(found, expected, rtol=0, atol=1e-11)
+
+
+def aside(hinges: int, newton: float) -> tuple[SoftModel, sr.Equilibrium]:
+    """A steel rod that is held aside, in no plane of its hinges."""
+    bending, mass = 200e9 * np.pi * 0.8e-3**4 / 4.0, 7850.0 * np.pi * 0.8e-3**2
+    shape = {"radius": 0.8e-3, "linear_density": mass, "bending_stiffness": bending, "torsional_stiffness": bending / 1.5}
+    model = rod(chain="lumped", hinges=hinges, torsion=True, extension=False, **shape)
+    force = newton * np.array((np.cos(0.7), np.sin(0.7), 0.0))
+    return model, sr.solve_equilibrium(model, (), force=force, gravity=(0.0, 0.0, -9.81))
+
+
+@pytest.mark.parametrize("mass_damping", [0.0, 2.0])
+def test_stages_of_a_rod_that_twists_as_it_swings_have_matrices_of_their_own(
+    mass_damping: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """With that of the second stage the corrections shrink slowly here; no step is halved, and all are those of `simulate`.
+
+    `simulate` goes on to the rounding of its corrections: by its own tolerance it is 5e-10 off here.
+    """
+    for name, value in (("CHANGE", 1e-16), ("ROUNDED", 1e-13), ("ITERATIONS", 100)):
+        monkeypatch.setattr(gauss, name, value)
+    (model, start), h, steps = aside(6, 0.15), 2.5e-3, 20
+    given: dict[str, Any] = {"start": start, "gravity": (0.0, 0.0, -9.81), "damping_time": 0.0, "time_step": h, "order": 4}
+    slow = sr.simulate(model, steps * h, (), mass_damping=mass_damping, **given)
+    solver, seen = sr.compile(model, backend="python"), []
+    run, _, _ = solver._motion_code(None, 0.0, mass_damping, 4)
+    workspace = run.workspace
+    run.workspace = lambda: seen.append(workspace()) or seen[-1]
+    fast = solver.simulate(steps * h, (), mass_damping=mass_damping, **given)
+    (w,) = seen
+    assert w[run.layout.coupled] == 1.0
+    assert w[run.layout.parts] == steps
+    np.testing.assert_allclose(fast.q_springs, slow.q_springs, rtol=0, atol=1e-9 * np.abs(slow.q_springs).max())
+
+
+def test_a_run_that_is_compared_ends_where_its_steps_have_too_many_parts(monkeypatch: pytest.MonkeyPatch) -> None:
+    """At exactly as many as it may have it goes on; with given steps, which are not compared, it goes on with any number."""
+    (model, start), grid = aside(3, 1.4), np.array([0.0, 0.1])
+    run, given, _ = sr.compile(model, backend="python")._motion_code((0.0, 0.0, -9.81), 0.0, 0.0, 4)
+    course = Course(MotorPath(model, (), 0.1), TimeLoad(model, None, None, 0.1), SpringKicks(model, []))
+    state, counted = (start.q_springs, np.zeros(model.n_springs)), run.workspace()
+    for place, values in [*given, (run.layout.position, state[0]), (run.layout.time_step, grid[1:])]:
+        run.put(counted, place, values)
+    assert run.motion_step(counted) == Status.CERTIFIED
+    parts = counted[run.layout.parts]
+    assert parts > 1.0
+    for allowed, compared, status in ((parts, True, 0), (parts - 1.0, True, Status.UNSETTLED), (1.0, False, 0)):
+        monkeypatch.setattr(motion_runs, "_PARTS_A_STEP", allowed / len(grid))
+        assert take_one(run, state, given, course, grid, grid, compared=compared).status[0] == status

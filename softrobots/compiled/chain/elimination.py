@@ -93,8 +93,12 @@ class Eliminated:
         return self.solved([(row @ turn) + more - one for row, more, one in rows])
 
     def solved(self, reduced: Sequence[Scalar]) -> Any:
-        """Return `D^-1 g'` from `L^-1 g'`, shape (k,): backwards through `L^T`."""
-        steps = [value * inverse for value, inverse in zip(reduced, self.inverse_pivots, strict=True)]
+        """Return `D^-1 g'` from `L^-1 g'`, shape (k,)."""
+        return self.raised([value * inverse for value, inverse in zip(reduced, self.inverse_pivots, strict=True)])
+
+    def raised(self, scaled: Sequence[Scalar]) -> Any:
+        """Return the same from `D'^-1 L^-1 g'`, shape (k,): backwards through `L^T`."""
+        steps = list(scaled)
         for j in reversed(range(len(steps))):
             for i in range(j + 1, len(steps)):
                 steps[j] = steps[j] - self.lower[i, j] * steps[i]

@@ -82,6 +82,7 @@ BEGIN_VELOCITY: int
 BEYOND: int
 CHANGE: int
 COASTS: int
+COUPLED: int
 FAILED: int
 LAG: int
 LAST_CHANGE: int

@@ -40,6 +40,8 @@ def settle_middle(w: Array) -> bool:
             return False
         slow = w[CHANGE] > RENEW_SHARE * w[LAST_CHANGE]
         w[LAST_CHANGE] = w[CHANGE]
+        if slow:
+            w[COUPLED] = 1.0
         if slow or (step == 0 and w[COASTS] < 0.5):
             motion_factor(w)
         else:

@@ -57,6 +57,8 @@ def settle_middle_lanes(w: Array, n_history: int) -> None:
     fill_lanes(w, LAST_CHANGE, 1e300)
     slow = 0.0
     for step in range(MOTION_CORRECTIONS):
+        if slow > 0.5:
+            fill_lanes(w, COUPLED, 1.0)
         if step == first or slow > 0.5:
             motion_factor_lanes(w)
         else:

@@ -16,14 +16,18 @@ this part of the stiffness the corrections of a step shrink by a factor of a tho
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from functools import partial
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, cross, outer, skew, symmetric, upper_triangle, vector
 from softrobots.compiled.chain.elimination import Eliminated, Outboard, eliminate
+from softrobots.compiled.motion.group_record import GroupRecord
 from softrobots.compiled.motion.moving_joints import RigidBody
+from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar
 
 
@@ -47,10 +51,39 @@ class JointLine:
         return self.axis @ (wrench[:3] if self.shift is None else wrench[3:])  # type: ignore[no-any-return]
 
 
-def with_body(inertia: Any, body: RigidBody, axes: Any) -> Any:
-    """Return an inertia, shape (6, 6), angular part first, with a body added."""
+class GroupMotion(NamedTuple):
+    """What the outward pass of a group leaves in its record."""
+
+    joints: list[JointLine]
+    """Its joints, base to tip; axes of their frames are not kept."""
+    wrenches: list[Vector]
+    """Moment and force that move the body behind each joint, shape (6,)."""
+    reach: Vector
+    """From its end to the next group [m]."""
+    slopes: Any
+    """Derivatives of the joint positions by the unknowns, shape (n, m)."""
+    torques: Any
+    """Torque of spring, damper and muscles on each unknown (m)."""
+
+    def at(self, record: GroupRecord, block: Block, stage: int) -> GroupMotion:
+        """Return the same at one of the stages."""
+        at = partial(record.at, block, stage=stage)
+        joints = []
+        for one in self.joints:
+            shift = None if one.shift is None else at(one.shift)
+            joints.append(JointLine(at(one.axis), shift, at(one.axes), one.body, at(one.force)))
+        return GroupMotion(joints, self.wrenches, at(self.reach), at(self.slopes), self.torques)
+
+
+def inertia_of(body: RigidBody, axes: Any) -> Any:
+    """Return the inertia of a body, shape (6, 6), angular part first."""
     lever, linear = skew(axes @ body.moment), constants(np.eye(3)) * body.mass
-    return inertia + np.block([[body.turned(axes), lever], [-lever, linear]])
+    return np.block([[body.turned(axes), lever], [-lever, linear]])
+
+
+def at_stages(move: Callable[[Vector, Vector], Vector], values: Vector, by: Sequence[Vector]) -> Vector:
+    """Return the wrenches or accelerations of all stages, shape (6 k,), moved `by` a vector at each stage (k)."""
+    return np.concatenate([move(values[6 * stage : 6 * stage + 6], one) for stage, one in enumerate(by)])
 
 
 def moved_wrench(wrench: Vector, by: Vector) -> Vector:
@@ -63,13 +96,20 @@ def moved_acceleration(acceleration: Vector, by: Vector) -> Vector:
     return np.concatenate([acceleration[:3], acceleration[3:] + cross(acceleration[:3], by)])
 
 
-def moved_inertia(inertia: Any, by: Vector) -> Any:
-    """Return an inertia about a point that is `by` nearer to the base."""
-    lever, linear, before = skew(by), inertia[3:, 3:], inertia[:3, 3:]
-    mixed = before + lever @ linear
-    angular = inertia[:3, :3] - mixed @ lever - (before @ lever).T
-    angular = symmetric([angular[index] for index in upper_triangle(3)], 3)  # its halves are rounded differently
-    return np.block([[angular, mixed], [mixed.T, linear]])
+def moved_inertia(inertia: Any, by: Sequence[Vector]) -> Any:
+    """Return an inertia of all stages, shape (6 k, 6 k), about points that are `by` nearer to the base at each stage (k)."""
+    moved, levers = inertia.copy(), [skew(one) for one in by]
+    for i, j in upper_triangle(len(by)):
+        rows, columns = slice(6 * i, 6 * i + 6), slice(6 * j, 6 * j + 6)
+        one = inertia[rows, columns]
+        linear, mixed = one[3:, 3:], one[:3, 3:] + levers[i] @ one[3:, 3:]
+        angular = one[:3, :3] - mixed @ levers[j] + levers[i] @ one[3:, :3]
+        below = one[3:, :3] - linear @ levers[j]
+        if i == j:  # symmetric, but its halves are rounded differently
+            angular, below = symmetric([angular[index] for index in upper_triangle(3)], 3), mixed.T
+        moved[rows, columns] = np.block([[angular, mixed], [below, linear]])
+        moved[columns, rows] = moved[rows, columns].T
+    return moved
 
 
 @dataclass
@@ -79,13 +119,13 @@ class ArticulatedGroup:
     eliminated: Eliminated
     """Elimination of its coordinates."""
     gain: Any
-    """`G^-1 U^T`: what its coordinates yield to an acceleration of its base, shape (k, 6)."""
+    """`D^-1 L^-1 U^T` of the factors `G = L D L^T`, shape (k m, 6 k)."""
     motions: Any
-    """Angular and linear velocity at its end per coordinate, shape (6, k)."""
-    shift: Vector
-    """From its first joint to its end [m]."""
-    reach: Vector
-    """From there to the next group [m]."""
+    """Angular and linear velocity at its end per coordinate, shape (6 k, k m)."""
+    shift: list[Vector]
+    """From its first joint to its end [m], at each stage (k)."""
+    reach: list[Vector]
+    """From there to the next group [m], at each stage (k)."""
 
 
 @dataclass
@@ -113,76 +153,83 @@ class Pull:
 
 
 def articulate(
-    inertia: Any, pull: Pull, joints: list[JointLine], reach: Vector, slopes: Any, own: Any, quarter: Scalar
-) -> tuple[ArticulatedGroup, Any, Pull]:
+    inertia: Any, pulls: Sequence[Pull], stages: Sequence[GroupMotion], own: Any, quarter: Any
+) -> tuple[ArticulatedGroup, Any, list[Pull]]:
     """Eliminate the coordinates of a group of joints.
 
     Args:
-        inertia: Inertia of all beyond, about the origin of the next group, shape (6, 6).
-        pull: Forces on all beyond, from there.
-        joints: The joints, base to tip.
-        reach: From the end of the last joint to there [m].
-        slopes: Derivatives of the joint positions by the coordinates, shape (n, k).
-        own: `h/2 D + h^2/4 K` of the coordinates themselves, with that of tensions along the group, shape (k, k).
-        quarter: `h^2/4` [s^2].
+        inertia: Inertia of all beyond at all stages, about the origin of the next group, shape (6 k, 6 k).
+        pulls: Forces on all beyond, from there, at each stage (k).
+        stages: The group at each stage.
+        own: `h/2 D + h^2/4 K` of the coordinates themselves, with that of tensions along the group, shape (k m, k m).
+        quarter: `h^2/4` [s^2], or what it is for two stages, shape (k, k).
 
     Returns:
         The factors, and inertia and forces from the origin of the group.
     """
-    inertia, pull, shift = moved_inertia(inertia, reach), pull.moved(reach), constants(np.zeros(3))
-    motions: list[Vector] = []  # angular and linear velocity of the end by each joint
-    pushes: list[Vector] = []  # moment and force by its acceleration, and by the turn of all nearer to the base
-    products = constants(np.zeros((len(joints), len(joints))))
-    for number in reversed(range(len(joints))):
-        joint = joints[number]
-        inertia = with_body(inertia, joint.body, joint.axes)
-        pull = pull.with_force(joint.force, joint.axes @ joint.body.centre)
-        if len(own):
-            push = (inertia[:, :3] if joint.shift is None else inertia[:, 3:]) @ joint.axis
-            turned = pull.bend(joint) * quarter
-            pushes.insert(0, np.concatenate([push[:3] + turned, push[3:]]))
-            for place, one in enumerate(pushes):
-                products[number, number + place] = products[number + place, number] = joint.load(one)
-            still = constants(np.zeros(3))
-            motion = (joint.axis, cross(joint.axis, shift)) if joint.shift is None else (still, joint.axis)
-            motions.insert(0, np.concatenate(motion))
-        if joint.shift is not None:
-            inertia, pull, shift = moved_inertia(inertia, joint.shift), pull.moved(joint.shift), shift + joint.shift
-            pushes = [moved_wrench(push, joint.shift) for push in pushes]
-    if not len(own):
-        rigid = Eliminated(constants(np.eye(0)), [], constants(np.zeros((0, 6))), [])
-        return ArticulatedGroup(rigid, rigid.coupling, constants(np.zeros((6, 0))), shift, reach), inertia, pull
-    block = slopes.T @ (products @ slopes) + own
-    bends = -(np.stack(pushes, axis=1) @ slopes)
-    none = constants(np.zeros(bends.shape))
-    eliminated, rest = eliminate(Outboard(-inertia, [], 1.0, 0.0), none, bends, block, [], [1.0] * len(own))
-    gain = np.stack([eliminated.solved([*column]) for column in eliminated.coupling.T], axis=1)
-    return ArticulatedGroup(eliminated, gain, np.stack(motions, axis=1) @ slopes, shift, reach), -rest.matrix, pull
+    k, (n, m), reach = len(stages), stages[0].slopes.shape, [one.reach for one in stages]
+    inertia, pulls = moved_inertia(inertia, reach), [pull.moved(by) for pull, by in zip(pulls, reach, strict=True)]
+    shifts = [constants(np.zeros(3)) for _ in stages]
+    motions = constants(np.zeros((6 * k, k * n)))  # angular and linear velocity of the end by each joint
+    pushes = motions.copy()  # moment and force by its acceleration, and by the turn of all nearer to the base
+    products = constants(np.zeros((k * n, k * n)))
+    for number in reversed(range(n)):
+        joints = [one.joints[number] for one in stages]
+        for stage, joint in enumerate(joints):
+            part = slice(6 * stage, 6 * stage + 6)
+            inertia[part, part] = inertia[part, part] + inertia_of(joint.body, joint.axes) * (-1.0) ** stage
+            pulls[stage] = pulls[stage].with_force(joint.force, joint.axes @ joint.body.centre)
+        bends = [pull.bend(joint) for pull, joint in zip(pulls, joints, strict=True)]
+        for stage, joint in enumerate(joints):
+            column, first = n * stage + number, 6 * stage
+            turns = slice(first, first + 3) if joint.shift is None else slice(first + 3, first + 6)
+            pushes[:, column] = inertia[:, turns] @ joint.axis
+            for row, bend in enumerate(bends):
+                mean = bend if row == stage else (bend + bends[stage]) * 0.5
+                pushes[6 * row : 6 * row + 3, column] += mean * quarter[row, stage]
+            motions[turns, column] = joint.axis
+            if joint.shift is None:
+                motions[first + 3 : first + 6, column] = cross(joint.axis, shifts[stage])
+        for row, stage in np.ndindex(k, k):
+            for place in range(n * stage + number, n * stage + n):
+                one = joints[row].load(pushes[6 * row : 6 * row + 6, place])
+                products[n * row + number, place] = products[place, n * row + number] = one
+        by = [joint.shift for joint in joints]
+        if by[0] is not None:
+            inertia, pulls = moved_inertia(inertia, by), [pull.moved(one) for pull, one in zip(pulls, by, strict=True)]
+            shifts = [one + other for one, other in zip(shifts, by, strict=True)]
+            pushes = np.stack([at_stages(moved_wrench, push, by) for push in pushes.T], axis=1)
+    slopes = constants(np.zeros((k * n, k * m)))
+    for stage, one in enumerate(stages):
+        slopes[n * stage : n * stage + n, m * stage : m * stage + m] = one.slopes
+    block, none = slopes.T @ (products @ slopes) + own, constants(np.zeros((6 * k, k * m)))
+    eliminated, rest = eliminate(Outboard(-inertia, [], 1.0, 0.0), none, -(pushes @ slopes), block, [], [1.0] * k * m)
+    gain = eliminated.coupling * vector(eliminated.inverse_pivots)[:, None]
+    return ArticulatedGroup(eliminated, gain, motions @ slopes, shifts, reach), -rest.matrix, pulls
 
 
-def carried_inward(group: ArticulatedGroup, gradient: list[Scalar], beyond: Vector) -> tuple[list[Scalar], Vector]:
+def carried_inward(group: ArticulatedGroup, gradient: Sequence[Scalar], beyond: Vector) -> tuple[list[Scalar], Vector]:
     """Take the torques out of balance on a group to its base.
 
     Args:
         group: Its factors.
-        gradient: The torque out of balance on each coordinate (k).
-        beyond: Sum `s` of the elimination at the next group, shape (6,).
+        gradient: The torque out of balance on each coordinate at all stages (k m), negative at the second.
+        beyond: Sum `s` of the elimination at the next group, shape (6 k,).
 
     Returns:
         What the coordinates yield to them, and `s` at the origin of the group.
     """
-    factors, beyond = group.eliminated, moved_wrench(beyond, group.reach)
+    factors, beyond = group.eliminated, at_stages(moved_wrench, beyond, group.reach)
     values = [value + group.motions[:, place] @ beyond for place, value in enumerate(gradient)]
-    total = moved_wrench(beyond, group.shift)
-    for gain, value in zip(group.gain, values, strict=True):
+    total = at_stages(moved_wrench, beyond, group.shift)
+    reduced = factors.reduced(values)
+    for gain, value in zip(group.gain, reduced, strict=True):
         total = total + gain * value
-    return factors.solved(factors.reduced(values)), total
+    return [value * inverse for value, inverse in zip(reduced, factors.inverse_pivots, strict=True)], total
 
 
 def carried_outward(group: ArticulatedGroup, yielded: Vector, before: Vector) -> tuple[Vector, Vector]:
-    """Return the corrections of the coordinates of a group, and the acceleration of the next that they give, shape (6,)."""
-    after = moved_acceleration(before, group.shift)
-    if not len(yielded):
-        return vector([]), moved_acceleration(after, group.reach)
-    steps = group.gain @ before - yielded
-    return steps, moved_acceleration(after + group.motions @ steps, group.reach)
+    """Return the corrections of the coordinates of a group, and the acceleration of the next that they give, shape (6 k,)."""
+    after = at_stages(moved_acceleration, before, group.shift)
+    steps = group.eliminated.raised(group.gain @ before - yielded)
+    return steps, at_stages(moved_acceleration, after + group.motions @ steps, group.reach)

@@ -18,7 +18,7 @@ class GroupRecord:
         """Begin without values."""
         self.size = 0
         self._stages = stages
-        self._kept: dict[int, Expression] = {}
+        self._kept: dict[tuple[str, int], Expression] = {}
 
     def keep(self, block: Block, values: Any) -> Any:
         """Write values at the end of a function; return what reads them, of the same shape. Constants stay constants."""
@@ -36,21 +36,21 @@ class GroupRecord:
         if value.operation == "neg":
             return -self._one(block, value.arguments[0])
         negative = -value
-        if isinstance(negative, Expression) and negative.number in self._kept:
-            return -self._kept[negative.number]
-        if value.number not in self._kept:
+        if isinstance(negative, Expression) and (block.name, negative.number) in self._kept:
+            return -self._kept[block.name, negative.number]
+        if (block.name, value.number) not in self._kept:
             block.store(self.size, value, block.each("at"))
-            self._kept[value.number] = block.load(self.size, block.each("at"))
+            self._kept[block.name, value.number] = block.load(self.size, block.each("at"))
             self.size += 1 if block.loop is None else self._stages
-        return self._kept[value.number]
+        return self._kept[block.name, value.number]
 
-    def last(self, block: Block, values: Any) -> Any:
-        """Return what reads values that have been kept at all stages, at the last one."""
-        return np.vectorize(lambda value: self._last(block, value), otypes=[object])(values)
+    def at(self, block: Block, values: Any, stage: int) -> Any:
+        """Return what reads values that have been kept at all stages, at one of them."""
+        return np.vectorize(lambda value: self._at(block, value, stage), otypes=[object])(values)
 
-    def _last(self, block: Block, value: Scalar) -> Scalar:
+    def _at(self, block: Block, value: Scalar, stage: int) -> Scalar:
         if not isinstance(value, Expression) or self._stages == 1:
             return value
         if value.operation == "neg":
-            return -self._last(block, value.arguments[0])
-        return block.load(value.arguments[2] + self._stages - 1, "at")
+            return -self._at(block, value.arguments[0], stage)
+        return block.load(value.arguments[2] + stage, "at")

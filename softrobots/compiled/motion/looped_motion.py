@@ -9,8 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import partial
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
@@ -20,6 +19,7 @@ from softrobots.compiled.chain.layout import assign_places
 from softrobots.compiled.chain.looped_chain import Kind
 from softrobots.compiled.motion.articulated import (
     ArticulatedGroup,
+    GroupMotion,
     JointLine,
     Pull,
     articulate,
@@ -40,8 +40,10 @@ from softrobots.compiled.motion.motion_groups import (
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import MovingFrame, moved, wrench
 from softrobots.compiled.trace.blocks import Block, TableColumns
-from softrobots.compiled.trace.complex_numbers import of_parts, parts_of
-from softrobots.compiled.trace.expressions import Scalar
+from softrobots.compiled.trace.complex_numbers import of_parts, parts_of, symmetric_form
+
+SOLVERS = ("articulate", "reduce", "correct"), ("couple", "reduce_coupled", "correct_coupled")
+"""Passes that factor and solve: with the matrix of the last stage for all of them, or with that of each stage."""
 
 
 @dataclass(frozen=True)
@@ -61,15 +63,15 @@ class GroupLayout:
     origin: int = field(init=False)
     """Position of its origin, where the tip is asked for [m] (3)."""
     inertia: int = field(init=False)
-    """Articulated inertia, upper triangle by columns (21), or real and imaginary parts."""
+    """Articulated inertia of all stages, upper triangle by columns (21, or 78 of two stages)."""
     pull: int = field(init=False)
-    """Forces on all beyond: their sum, and the products of levers and forces (12)."""
+    """Forces on all beyond: their sum, and the products of levers and forces (12), stage by stage."""
     wrench: int = field(init=False)
     """Moment and force that all bodies beyond need (6, stages)."""
     sums: int = field(init=False)
-    """`s` of the elimination (6), or real and imaginary parts."""
+    """`s` of the elimination (6), stage by stage."""
     answer: int = field(init=False)
-    """Angular and linear acceleration that the corrections so far add up to (6), or real and imaginary parts."""
+    """Angular and linear acceleration that the corrections so far add up to (6), stage by stage."""
     base: int = field(init=False)
     """Frame behind the leading motors (18)."""
     cosine: int = field(init=False)
@@ -88,7 +90,7 @@ class GroupLayout:
     def __post_init__(self) -> None:
         """Compute the places."""
         n, s = self.unknowns, self.stages
-        passes = dict(frame=18 * s, origin=3, inertia=21 * s, pull=12, wrench=6 * s, sums=6 * s, answer=6 * s)
+        passes = dict(frame=18 * s, origin=3, inertia=3 * s * (6 * s + 1), pull=12 * s, wrench=6 * s, sums=6 * s, answer=6 * s)
         state = dict(coordinates=3 * self.free * s, state=4 * n * s if s > 1 else 0)
         assign_places(self, self.first, **passes, base=18, cosine=n * s, sine=n * s, **state, bounds=2, end=0)
 
@@ -119,20 +121,11 @@ def _trace_kind(
 ) -> Kind:
     names = ("at", "row", "q")
     out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names, loop=places.loop)
-    back = Block(f"resist_{number}", "Inward pass: torques out of balance.", names, out.trace, loop=places.loop)
-    factor, step, place = (
-        Block(f"{name}_{number}", purpose, names, out.trace)
-        for name, purpose in (
-            ("articulate", "Inward pass: articulated inertia and factors."),
-            ("correct", "Outward pass: correction of the accelerations."),
-            ("place", "Outward pass with positions alone."),
-        )
-    )
+    resist = back = Block(f"resist_{number}", "Inward pass: torques out of balance.", names, out.trace, loop=places.loop)
+    place = Block(f"place_{number}", "Outward pass with positions alone.", names, out.trace)
     columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), GroupRecord(places.stages)
     group = MovingGroup(plan, out, groups, columns, parts, places.state if places.stages > 1 else None)
     moving = _trace_move(out, record, places, group)
-    factors = _trace_factors(factor, record, plan, places, group, moving.last(record, factor))
-
     stages = places.stages
     total, loads = moved_wrench(vector(back.spaced(places.wrench, 6, stages, back.each())), moving.reach), []
     for joint, own in zip(moving.joints[::-1], moving.wrenches[::-1], strict=True):
@@ -141,62 +134,44 @@ def _trace_kind(
         total = total if joint.shift is None else moved_wrench(total, joint.shift)
     back.store_spaced(places.wrench, total.tolist(), stages, back.each())
     gradient = [slope @ vector(loads[::-1]) + torque for slope, torque in zip(moving.slopes.T, moving.torques, strict=True)]
-    blocks, layout, n = [out, factor, back, step, place], plan.layout, places.unknowns
+    blocks, layout, n = [out, resist, place], plan.layout, places.unknowns
     if plan.reduces:
         written, read = plan.torques
         back.store_spaced(written, gradient, stages, back.each(plan.row("q")))
-        back = Block(f"reduce_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
-        blocks.append(back)
-        sides = [back.spaced(read + stage, len(gradient), stages, plan.row("q")) for stage in range(stages)]
+        sides = [vector(back.spaced(read + stage, len(gradient), stages, plan.row("q"))) for stage in range(stages)]
         gradient = right_hand_side(*sides) if layout.in_stages else [*sides[0]]
-    yielded, sums = carried_inward(factors, gradient, _loaded(back, places.sums, 6, places))
-    _store(back, places.sums, sums, places)
-    kept = record.keep(back, yielded)
-    steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6, places))
-    shares = steps * (1.0 / plan.massive(step)) if len(steps) and layout.full_damping else steps
-    for stage, one in enumerate(corrections(shares) if layout.in_stages else (shares.tolist(),)):
-        step.store_all(plan.correction + stage * n, one, "q")
-    _store(step, places.answer, answer, places)
+    for coupled, (factoring, reducing, correcting) in enumerate(SOLVERS[: 1 + plan.couples]):
+        factor = Block(f"{factoring}_{number}", "Inward pass: articulated inertia and factors.", names, out.trace)
+        step = Block(f"{correcting}_{number}", "Outward pass: correction of the accelerations.", names, out.trace)
+        if plan.reduces:
+            back = Block(f"{reducing}_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
+            blocks.append(back)
+        at = [moving.at(record, factor, stage) for stage in (range(stages) if coupled else [stages - 1])]
+        factors = _trace_factors(factor, record, plan, places, group, at)
+        parts = parts_of(gradient)
+        side = [*parts[: len(gradient)], *(-one for one in parts[len(gradient) :])] if coupled else gradient
+        is_complex = layout.in_stages and not coupled
+        yielded, sums = carried_inward(factors, side, _loaded(back, places.sums, 6 * stages, is_complex))
+        back.store_all(places.sums, parts_of(sums) if is_complex else sums)
+        kept = record.keep(back, yielded)
+        steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6 * stages, is_complex))
+        step.store_all(places.answer, parts_of(answer) if is_complex else answer)
+        steps = vector(of_parts(steps)) if coupled else steps
+        shares = steps * (1.0 / plan.massive(step)) if len(steps) and layout.full_damping else steps
+        for stage, one in enumerate(corrections(shares) if layout.in_stages else (shares.tolist(),)):
+            step.store_all(plan.correction + stage * n, one, "q")
+        blocks += [factor, step]
     _trace_place(place, places, group, plan.strains[0])
     return Kind(number, [group[0] for group in groups], blocks, columns, record.size)
 
 
-def _loaded(block: Block, place: int, count: int, places: GroupLayout) -> Vector:
-    """Read real or complex numbers."""
-    values = block.loads(place, places.stages * count)
-    return vector(of_parts(values) if places.stages == 2 else values)
+def _loaded(block: Block, place: int, count: int, is_complex: bool) -> Vector:
+    """Read numbers, or half as many complex ones."""
+    values = block.loads(place, count)
+    return vector(of_parts(values) if is_complex else values)
 
 
-def _store(block: Block, place: int, values: Sequence[Scalar], places: GroupLayout) -> None:
-    """Write real or complex numbers."""
-    block.store_all(place, parts_of(values) if places.stages == 2 else list(values))
-
-
-class _Moving(NamedTuple):
-    """What the outward pass of a group leaves in its record."""
-
-    joints: list[JointLine]
-    """Its joints, base to tip; axes of their frames are not kept."""
-    wrenches: list[Vector]
-    """Moment and force that move the body behind each joint, shape (6,)."""
-    reach: Vector
-    """From its end to the next group [m]."""
-    slopes: Any
-    """Derivatives of the joint positions by the unknowns, shape (n, k)."""
-    torques: Any
-    """Torque of spring, damper and muscles on each unknown (k)."""
-
-    def last(self, record: GroupRecord, block: Block) -> _Moving:
-        """Return the same at the last stage."""
-        at = partial(record.last, block)
-        joints = []
-        for one in self.joints:
-            shift = None if one.shift is None else at(one.shift)
-            joints.append(JointLine(at(one.axis), shift, at(one.axes), one.body, at(one.force)))
-        return _Moving(joints, self.wrenches, at(self.reach), at(self.slopes), self.torques)
-
-
-def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: MovingGroup) -> _Moving:
+def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: MovingGroup) -> GroupMotion:
     frame = load_frame(out, places.frame, places.stages, out.each())
     states, slopes = group.joints(out, places.cosine, places.sine)
     turns = {place: element.rotation for place, element in enumerate(group.elements)}
@@ -213,21 +188,29 @@ def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: Mov
     frame = replace(frame, axes=frame.axes @ group.turn)
     reach = frame.axes @ group.reach
     store_frame(out, places.frame, frame.shifted(range(3), group.reach), places.stages, out.each())
-    return _Moving(joints, wrenches, *(record.keep(out, one) for one in (reach, slopes, vector(group.torques))))
+    return GroupMotion(joints, wrenches, *(record.keep(out, one) for one in (reach, slopes, vector(group.torques))))
 
 
 def _trace_factors(
-    factor: Block, record: GroupRecord, plan: MotionPlan, places: GroupLayout, group: MovingGroup, moving: _Moving
+    factor: Block, record: GroupRecord, plan: MotionPlan, places: GroupLayout, group: MovingGroup, stages: Sequence[GroupMotion]
 ) -> ArticulatedGroup:
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
-    quarter, pulls = plan.factors(factor)[1] * (1.0 / plan.massive(factor)), vector(factor.loads(places.pull, 12))
-    inertia, pull = symmetric(_loaded(factor, places.inertia, 21, places), 6), Pull(pulls[:3], pulls[3:].reshape(3, 3))
-    own = np.diag(vector(group.own)) if group.own else constants(np.zeros((0, 0)))
-    for (row, column), value in group.curvatures.items():
+    k, m, quarter = len(stages), len(group.own), plan.factors(factor)[1] * (1.0 / plan.massive(factor))
+    is_complex, form = k < places.stages, symmetric_form if k > 1 else (lambda value: vector([value])[:, None])
+    count = 3 * k * (6 * k + 1)
+    inertia = symmetric(_loaded(factor, places.inertia, count * (1 + is_complex), is_complex), 6 * k)
+    levers = [vector(factor.loads(places.pull + 12 * stage + 3, 9)).reshape(3, 3) for stage in range(k)]
+    pulls = [Pull(vector(factor.loads(places.pull + 12 * stage, 3)), one) for stage, one in enumerate(levers)]
+    own = constants(np.zeros((k * m, k * m)))
+    for place, value in enumerate(group.own):
+        own[place::m, place::m] = form(value)
+    for (row, column), value in group.curvatures.items():  # of routes, which one matrix is for
         own[row, column] = own[column, row] = own[row, column] + value * quarter
-    found, inertia, pull = articulate(inertia, pull, moving.joints, moving.reach, moving.slopes, own, quarter)
-    _store(factor, places.inertia, [inertia[index] for index in upper_triangle(6)], places)
-    factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
+    found, inertia, pulls = articulate(inertia, pulls, stages, own, form(quarter))
+    triangle = [inertia[index] for index in upper_triangle(6 * k)]
+    factor.store_all(places.inertia, parts_of(triangle) if is_complex else triangle)
+    for stage, pull in enumerate(pulls):
+        factor.store_all(places.pull + 12 * stage, [*pull.force, *pull.spread.ravel()])
     one = found.eliminated
     lower, inverses = (record.keep(factor, part) for part in (one.lower, one.inverse_pivots))
     copies = (record.keep(factor, part) for part in (found.gain, found.motions, found.shift, found.reach))

@@ -9,7 +9,7 @@ import numpy as np
 from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.unrolled_chain import place_base
 from softrobots.compiled.motion.gauss_step import copy_block, place_block
-from softrobots.compiled.motion.looped_motion import GroupLayout, group_kinds, load_frame, store_frame
+from softrobots.compiled.motion.looped_motion import SOLVERS, GroupLayout, group_kinds, load_frame, store_frame
 from softrobots.compiled.motion.motion_groups import motion_groups, reach_behind
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import MovingFrame, joint_state, moved
@@ -27,7 +27,7 @@ _PASSES = {
     "place": "Outward pass with positions alone.",
 }
 _REDUCE = "Inward pass: elimination of the torques at both stages."
-_INWARD = ("articulate", "resist", "reduce")
+_INWARD = ("articulate", "resist", "reduce", "couple", "reduce_coupled")
 
 _MOVE = """    start_move_SUFFIX(w)
 BEND    move_all_SUFFIX(w)
@@ -35,9 +35,8 @@ BEND    move_all_SUFFIX(w)
 _BEND = """    for i in range(N_BENDS):
         bend_SUFFIX(w, i)
 """
-_ARTICULATE = """    start_articulate_SUFFIX(w)
-    articulate_all_SUFFIX(w)
-"""
+_FACTOR = "    articulate_all_SUFFIX(w)\n"
+_ARTICULATE = "    start_articulate_SUFFIX(w)\n" + _FACTOR
 _RESIST = """    start_resist_SUFFIX(w)
     resist_all_SUFFIX(w)
 """
@@ -106,6 +105,9 @@ def _control(plan: MotionPlan, bends: bool) -> str:
         solve = "    correct_strains_SUFFIX(w)\n" + ("    free_corrections_SUFFIX(w)\n" if held else "")
     elif plan.reduces:
         solve = "    reduce_all_SUFFIX(w)\n" + solve
+    if plan.couples:
+        articulate = articulate.replace(_FACTOR, _either("    couple_all_SUFFIX(w)\n", _FACTOR))
+        solve = _either(solve.replace("_all", "_coupled_all"), solve)
     massive = _MASSIVE if plan.layout.full_damping else ""
     resist += _DAMP + massive + _FREE if held else massive
     evaluate = ("    resist_stages_SUFFIX(w)\n", "") if in_stages else (move, resist)
@@ -117,11 +119,19 @@ def _control(plan: MotionPlan, bends: bool) -> str:
     return text.replace("BEND", _BEND if bends else "")
 
 
+def _either(coupled: str, otherwise: str) -> str:
+    """Text of what is done where each stage has a matrix of its own, and otherwise."""
+    one, other = (part.replace("    ", "        ") for part in (coupled, otherwise))
+    return f"    if w[COUPLED] > 0.5:\n{one}    else:\n{other}"
+
+
 def looped_motion(plan: MotionPlan) -> MotionParts:
     """Trace the functions of a looped chain."""
     unknowns, layout, routes = plan.unknowns, plan.layout, plan.routes
     in_stages, n = layout.in_stages, len(unknowns.strains)
     passes = _PASSES | ({"reduce": _REDUCE} if plan.reduces else {})
+    if plan.couples:
+        passes |= {coupled: passes[name] for name, coupled in zip(*SOLVERS, strict=True)}
     first, free = (layout.prepared, 0) if routes is None else (routes.end, layout.unknowns * (in_stages and routes.held))
     places = GroupLayout(first, n, free, 2 if in_stages else 1)
     actuators = None if routes is None else actuator_parts(plan, routes)
@@ -166,9 +176,12 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         [
             *([] if actuators is None else actuators.loops(suffix)),
             *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
-            (("" if actuators is None else actuators.after) + _control(plan, bends) + end).replace("_SUFFIX", suffix).strip(),
+            (("" if actuators is None else actuators.after) + _control(plan, bends) + end)
+            .replace("_SUFFIX", suffix)
+            .replace("w[COUPLED]", flag)
+            .strip(),
         ]
-        for suffix in ("", "_lanes")
+        for suffix, flag in (("", "w[COUPLED]"), ("_lanes", "w[COUPLED * LANES]"))
     )
     return MotionParts([*frame, *(block for kind in kinds for block in kind.blocks)], record, tables, loops, lane_loops)
 
@@ -230,8 +243,8 @@ def _bend(places: GroupLayout, strains: int) -> Block:
 
 def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_articulate", "Start at the tip with its force, without bodies beyond.")
-    block.store_all(places.inertia, [0.0] * 21 * places.stages)
-    block.store_all(places.pull, [*_tip_force(plan, block), *[0.0] * 9])
+    block.store_all(places.inertia, [0.0] * (places.pull - places.inertia))
+    block.store_all(places.pull, [*_tip_force(plan, block), *[0.0] * 9] * places.stages)
     return block
 
 

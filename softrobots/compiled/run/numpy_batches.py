@@ -205,6 +205,7 @@ class MotionBatches:
         w[layout.last_change] = np.full(len(failed), 1e300)
         slow = False
         for correction in range(MOTION_CORRECTIONS):
+            w[layout.coupled] = 1.0 if slow else w[layout.coupled]
             if correction == 1 or correction + n_history == 0 or slow:
                 functions.motion_factor(w)
             else:

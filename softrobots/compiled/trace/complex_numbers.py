@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+import numpy as np
+
 from softrobots.compiled.trace.expressions import Expression, Scalar
 
 
@@ -57,6 +59,12 @@ class ComplexScalar(Expression):
 def real_part(value: Scalar) -> Scalar:
     """Return the real part of a number."""
     return _parts(value)[0]
+
+
+def symmetric_form(value: Scalar) -> Any:
+    """Return the symmetric matrix from real and imaginary part of a number to those of its product, the last one negated."""
+    re, im = _parts(value)
+    return np.array([[re, -im], [-im, -re]], dtype=object)
 
 
 def parts_of(values: Sequence[Scalar]) -> list[Scalar]:
