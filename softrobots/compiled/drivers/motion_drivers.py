@@ -7,7 +7,7 @@ Functions in the kernel language, see `softrobots.compiled.drivers.equilibrium_d
 from __future__ import annotations
 
 from softrobots.compiled.drivers.generated_names import *
-from softrobots.compiled.drivers.intrinsics import Array, fabs
+from softrobots.compiled.drivers.intrinsics import Array, fabs, where
 from softrobots.compiled.motion_settings import *
 
 
@@ -40,8 +40,7 @@ def settle_middle(w: Array) -> bool:
             return False
         slow = w[CHANGE] > RENEW_SHARE * w[LAST_CHANGE]
         w[LAST_CHANGE] = w[CHANGE]
-        if slow:
-            w[COUPLED] = 1.0
+        w[COUPLED] = where(slow, 1.0, w[COUPLED])
         if slow or (step == 0 and w[COASTS] < 0.5):
             motion_factor(w)
         else:

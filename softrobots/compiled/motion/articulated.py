@@ -11,7 +11,8 @@ one rigid body would, with an inertia of 6 x 6. With the inertia `C_j` of the bo
 
 and the group hands on `I - U G^{-1} U^T`. The moments `c_j` are how forces that keep their direction change the torque of a
 joint where all nearer to the base turns, as in `softrobots.compiled.chain.elements`. Forces of the bodies nearly do, and with
-this part of the stiffness the corrections of a step shrink by a factor of a thousand each instead of fifty.
+this part of the stiffness the corrections of a step shrink by a factor of a thousand each instead of fifty. Where both stages
+of a step have a matrix of their own, the two make one real matrix, symmetric once the rows of the second change their sign.
 """
 
 from __future__ import annotations
@@ -185,8 +186,8 @@ def articulate(
             turns = slice(first, first + 3) if joint.shift is None else slice(first + 3, first + 6)
             pushes[:, column] = inertia[:, turns] @ joint.axis
             for row, bend in enumerate(bends):
-                mean = bend if row == stage else (bend + bends[stage]) * 0.5
-                pushes[6 * row : 6 * row + 3, column] += mean * quarter[row, stage]
+                turned = bend if row == stage else (bend + bends[stage]) * 0.5
+                pushes[6 * row : 6 * row + 3, column] += turned * quarter[row, stage]
             motions[turns, column] = joint.axis
             if joint.shift is None:
                 motions[first + 3 : first + 6, column] = cross(joint.axis, shifts[stage])
@@ -200,8 +201,8 @@ def articulate(
             shifts = [one + other for one, other in zip(shifts, by, strict=True)]
             pushes = np.stack([at_stages(moved_wrench, push, by) for push in pushes.T], axis=1)
     slopes = constants(np.zeros((k * n, k * m)))
-    for stage, one in enumerate(stages):
-        slopes[n * stage : n * stage + n, m * stage : m * stage + m] = one.slopes
+    for stage, motion in enumerate(stages):
+        slopes[n * stage : n * stage + n, m * stage : m * stage + m] = motion.slopes
     block, none = slopes.T @ (products @ slopes) + own, constants(np.zeros((6 * k, k * m)))
     eliminated, rest = eliminate(Outboard(-inertia, [], 1.0, 0.0), none, -(pushes @ slopes), block, [], [1.0] * k * m)
     gain = eliminated.coupling * vector(eliminated.inverse_pivots)[:, None]

@@ -123,10 +123,10 @@ def _trace_kind(
     out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names, loop=places.loop)
     resist = back = Block(f"resist_{number}", "Inward pass: torques out of balance.", names, out.trace, loop=places.loop)
     place = Block(f"place_{number}", "Outward pass with positions alone.", names, out.trace)
-    columns, record = TableColumns(out, f"GROUP_{number}", len(groups)), GroupRecord(places.stages)
-    group = MovingGroup(plan, out, groups, columns, parts, places.state if places.stages > 1 else None)
+    stages, columns = places.stages, TableColumns(out, f"GROUP_{number}", len(groups))
+    record = GroupRecord(stages)
+    group = MovingGroup(plan, out, groups, columns, parts, places.state if stages > 1 else None)
     moving = _trace_move(out, record, places, group)
-    stages = places.stages
     total, loads = moved_wrench(vector(back.spaced(places.wrench, 6, stages, back.each())), moving.reach), []
     for joint, own in zip(moving.joints[::-1], moving.wrenches[::-1], strict=True):
         total = total + own
@@ -146,18 +146,16 @@ def _trace_kind(
         if plan.reduces:
             back = Block(f"{reducing}_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
             blocks.append(back)
-        at = [moving.at(record, factor, stage) for stage in (range(stages) if coupled else [stages - 1])]
-        factors = _trace_factors(factor, record, plan, places, group, at)
-        parts = parts_of(gradient)
-        side = [*parts[: len(gradient)], *(-one for one in parts[len(gradient) :])] if coupled else gradient
-        is_complex = layout.in_stages and not coupled
+        at, m = [moving.at(record, factor, stage) for stage in range(0 if coupled else stages - 1, stages)], len(gradient)
+        factors, is_complex = _trace_factors(factor, record, plan, places, group, at), layout.in_stages and not coupled
+        side = [-one if place >= m else one for place, one in enumerate(parts_of(gradient))] if coupled else gradient
         yielded, sums = carried_inward(factors, side, _loaded(back, places.sums, 6 * stages, is_complex))
         back.store_all(places.sums, parts_of(sums) if is_complex else sums)
         kept = record.keep(back, yielded)
         steps, answer = carried_outward(factors, kept, _loaded(step, places.answer, 6 * stages, is_complex))
         step.store_all(places.answer, parts_of(answer) if is_complex else answer)
-        steps = vector(of_parts(steps)) if coupled else steps
-        shares = steps * (1.0 / plan.massive(step)) if len(steps) and layout.full_damping else steps
+        shares = vector(of_parts(steps)) if coupled else steps
+        shares = shares * (1.0 / plan.massive(step)) if m and layout.full_damping else shares
         for stage, one in enumerate(corrections(shares) if layout.in_stages else (shares.tolist(),)):
             step.store_all(plan.correction + stage * n, one, "q")
         blocks += [factor, step]

@@ -172,14 +172,12 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     tables |= {"N_STRAINS": n, "N_BENDS": n * places.stages, "N_STAGES": places.stages, "RATES": _rates(plan, places)}
     tables |= {} if actuators is None else actuators.tables
     end = _END.replace("CLOSE", _CLOSE if held else "") if layout.rubbing else ""
+    control = (("" if actuators is None else actuators.after) + _control(plan, bends) + end).strip()
     loops, lane_loops = (
         [
             *([] if actuators is None else actuators.loops(suffix)),
             *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
-            (("" if actuators is None else actuators.after) + _control(plan, bends) + end)
-            .replace("_SUFFIX", suffix)
-            .replace("w[COUPLED]", flag)
-            .strip(),
+            control.replace("_SUFFIX", suffix).replace("w[COUPLED]", flag),
         ]
         for suffix, flag in (("", "w[COUPLED]"), ("_lanes", "w[COUPLED * LANES]"))
     )
