@@ -40,6 +40,8 @@ _HALVINGS = 6  # of the way between two waypoints
 _LARGEST_STEP = 0.5  # [rad], norm of one step over the scale of the actuators
 _STATIONARY = 1e-8  # slope of the distance [m/rad per m of reach] that counts as zero: a local minimum
 _JUMP = 1.0  # change of an actuator between two waypoints, relative to its scale, that is no continuous motion
+_NO_NEARER = 1e-4  # share of the way to the goal in a step that is refused, with which shorter ones lead nowhere
+_MOST_STEPS = 30  # of a search from the waypoint before
 _NEAR = 0.02  # distance from the goal, relative to the reach, that a step home may cost
 
 
@@ -217,10 +219,11 @@ def search(
         elif refused + 1 < len(models):
             refused += 1
         else:
-            mu = max((3.0 if rubs else 10.0) * mu, 10.0 * _LAST_DAMPING * model.reach)
-            refused, ease = (0, 1.0) if rubs else (refused, ease)
-            if mu > 1e6 * model.reach:
+            nearer = float(np.linalg.norm(slope @ towards))
+            if nearer <= max(_NO_NEARER * float(np.linalg.norm(missing)), 0.01 * tolerance):
                 break
+            mu = max((3.0 if rubs else 10.0) * mu, nearer / float(np.linalg.norm(step)))  # half as far, at most
+            refused, ease = (0, 1.0) if rubs else (refused, ease)
     ended = here if reached is None or here.arrived(tolerance) else reached
     return replace(ended, iterations=iteration, unsolved=unsolved)
 
@@ -263,7 +266,7 @@ def advance(
         if float(np.linalg.norm(step)) <= _LARGEST_STEP:
             motors = actuators.go(here.q_motors, actuators.basis @ step)
             springs = here.state.q_springs + shift + follow @ (motors - here.q_motors)
-            near: dict[str, Any] = {"home": here.q_motors, "farthest": _JUMP}
+            near: dict[str, Any] = {"home": here.q_motors, "farthest": _JUMP, "max_iterations": _MOST_STEPS}
             found = search(there, motors, springs, tolerance=tolerance, damping=WARM_DAMPING, **near)
             if found is not None and found.arrived(tolerance) and _apart(tip.model, found.q_motors, here.q_motors) <= _JUMP:
                 return found

@@ -38,6 +38,7 @@ from softrobots.statics.tip_search import SAME, WARM_DAMPING, LocalSolution, adv
 from softrobots.statics.tip_steps import TipModel
 
 _MOST_TURNS = 100  # small steps of the motors before one of the tip
+_MOST_IDLE, _IDLE = 10, 1e-3  # of them after which neither tip nor motors are nearer, by that share of the way that was left
 _MOST_EASED = 8  # times that a jammed tip is let press less
 _MOST_NEARER = 5  # corrections of motors that turn more than they must
 _FORCED = 1e-4  # sliding in a step of a contact that sticks, over the reach, until the motors have been found that prevent it
@@ -158,7 +159,7 @@ class TargetWay:
         """Put the tip to the target of a place; None if no small step of the robot does."""
         number = min(int(place), len(self._goals) - 2)
         goal = self._goals[number].between(self._goals[number + 1], place - number)
-        work = 0.0
+        work, idle, least, nearest = 0.0, 0, np.inf, np.inf
         for _ in range(_MOST_TURNS):
             tip = RubbingTip(self.given(here.q_motors), here.sliding, goal)
             found = tip.solve(here.q_motors, here.q_springs)
@@ -178,9 +179,11 @@ class TargetWay:
             if far <= 1.0:
                 passed = may_have_passed(found.state.robot, here)
                 return None if passed else found.state._replace(work=work + found.state.work)
+            idle = 0 if far < (1.0 - _IDLE) * least or found.error < (1.0 - _IDLE) * nearest else idle + 1
+            least, nearest = min(least, far), min(nearest, found.error)
             part = self._model.actuators.go(here.q_motors, min(0.5, 0.5 / far) * turn)
             turned = step(self.given(part), here)
-            if turned is None or not np.any(part != here.q_motors):
+            if turned is None or idle > _MOST_IDLE or not np.any(part != here.q_motors):
                 return None
             here, work = turned, work + turned.work
         return None

@@ -8,7 +8,7 @@ from itertools import pairwise
 from typing import Any
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import TargetUnreachable
+from softrobots.core.errors import SoftRobotsError, TargetUnreachable
 from softrobots.environment.swept import may_pass
 from softrobots.model.friction_coordinates import after_step
 from softrobots.statics.elastic_state import ElasticState, elastic_state
@@ -19,6 +19,10 @@ from softrobots.statics.tip_goal import Goal, LoadedTip
 from softrobots.statics.tip_search import LocalSolution, advance
 
 _HALVINGS = 12  # of the way between two waypoints beside an obstacle
+
+
+class _Blocked(SoftRobotsError):
+    """No continuous motion leads to a waypoint; the text says what is in the way, after a semicolon, or nothing."""
 
 
 def named(error: TargetUnreachable, number: int, total: int) -> TargetUnreachable:
@@ -50,9 +54,9 @@ def exact_steps(
     here = LocalSolution(first.q_motors, elastic_state(first.model, first.q_motors, first.q_springs, load), 0.0)
     tip = replace(tip, model=after_step(first.model, first.q_motors, first.q_springs))
     for number, (last, target) in enumerate(pairwise(goals), start=2):
-        reached = _reach(tip, last, target, here, tolerance)
-        if isinstance(reached, str):
-            blocked = reached
+        try:
+            reached = _reach(tip, last, target, here, tolerance)
+        except _Blocked as blocked:
             try:
                 reached = _jump(tip, target, here.q_motors, tolerance)
             except TargetUnreachable as error:
@@ -67,13 +71,13 @@ def exact_steps(
                     f"waypoint {number} of {len(goals)}: no continuous motion reaches it from the previous one; the nearest "
                     f"solution is a jump of the motors by {apart.round(4).tolist()} {units} (allow_jumps=True takes it)"
                     + (f"; {singular}" if singular else "")
-                    + blocked,
+                    + str(blocked),
                     best=IkSolution(
                         target.position, target.rotation, solution, reached.error, reached.angle, reached.iterations, ()
                     ),
                     residual=reached.error,
                     iterations=reached.iterations,
-                )
+                ) from None
         here = reached
         found = equilibrium_from_state(tip.model, here.q_motors, load, here.state, method=method, iterations=here.iterations)
         tip = replace(tip, model=after_step(found.model, found.q_motors, found.q_springs))
@@ -82,20 +86,23 @@ def exact_steps(
 
 def _reach(
     tip: LoadedTip, last: Goal, target: Goal, here: LocalSolution[ElasticState], tolerance: float, halvings: int = _HALVINGS
-) -> LocalSolution[ElasticState] | str:
-    """Move from one waypoint to the next in steps that pass through nothing; else say after a semicolon what is in the way."""
+) -> LocalSolution[ElasticState]:
+    """Move from one waypoint to the next in steps that pass through nothing; `_Blocked` if there are none."""
     reached, before, around = advance(tip, last, target, here, tolerance), here.state.touch, tip.load.environment
-    if reached is None or around is None or before is None or reached.state.touch is None:
-        return "" if reached is None else reached
+    if reached is None:
+        raise _Blocked
+    if around is None or before is None or reached.state.touch is None:
+        return reached
     surroundings, q = before.surroundings, here.state.q
     passed = may_pass(before.gaps, reached.state.touch.gaps, around, lambda margin: surroundings.at(q, margin))
     if passed is None:
         return reached
     if halvings == 0:
-        return f"; {surroundings.link(passed[0])!r} would pass through {(*around.names, 'the robot itself')[passed[1]]!r}"
+        names = (*around.names, "the robot itself")
+        raise _Blocked(f"; {surroundings.link(passed[0])!r} would pass through {names[passed[1]]!r}")
     middle = last.between(target, 0.5)
     half = _reach(tip, last, middle, here, tolerance, halvings - 1)
-    return half if isinstance(half, str) else _reach(tip, middle, target, half, tolerance, halvings - 1)
+    return _reach(tip, middle, target, half, tolerance, halvings - 1)
 
 
 def _jump(tip: LoadedTip, target: Goal, start: FloatArray, tolerance: float) -> LocalSolution[ElasticState]:
