@@ -9,6 +9,9 @@ from scipy.optimize import minimize
 import softrobots as sr
 from softrobots.statics.inverse_kinematics import elbow_side
 from softrobots.statics.kinematics import frame_placement
+from softrobots.statics.loads import Load
+from softrobots.statics.tip_goal import Goal, LoadedTip
+from softrobots.statics.tip_search import WARM_DAMPING, search
 from tests.support.oracles import flexible_table, rigid_table
 from tests.support.tables import each_row
 
@@ -159,3 +162,29 @@ def test_bad_input_is_refused(arm: sr.SoftModel, options: dict, message: str) ->
 def test_a_robot_without_motors_is_refused() -> None:
     with pytest.raises(sr.ParameterError, match="at least one motor"):
         sr.solve_ik(sr.load_model(sr.InflatableArm(), motors=[]), (1, 0, 0))
+
+
+@pytest.mark.parametrize("way", [(0.02, 0.0, 0.0), (0.0, 0.03, -0.01), (0.001, 0.002, 0.03)])
+def test_a_refused_step_is_tried_again_half_as_far_at_most(
+    arm: sr.SoftModel, monkeypatch: pytest.MonkeyPatch, way: tuple[float, float, float]
+) -> None:
+    """Where nothing but the start has an equilibrium, a search tries shorter and shorter steps, and no step twice.
+
+    With damping `|J s| / |s|` no step is longer than half of s, whatever the singular values of J; it ends after few.
+    """
+    start, solve = np.array([0.3, 0.6, -0.8]), LoadedTip.solve
+    there = sr.solve_equilibrium(arm, start, FORCE)
+    tried: list[float] = []
+
+    def shy(tip: LoadedTip, q_motors: np.ndarray, springs: np.ndarray) -> object:
+        tried.append(float(np.linalg.norm(q_motors - start)))
+        return None if len(tried) > 1 else solve(tip, q_motors, springs)
+
+    monkeypatch.setattr(LoadedTip, "solve", shy)
+    tip = LoadedTip(arm, Goal(there.tip_position + way), Load.of(arm, FORCE))
+    found = search(tip, start, there.q_springs, damping=WARM_DAMPING)
+    assert found is not None
+    assert not found.arrived(TOLERANCE)
+    lengths = np.array(tried[1:])
+    assert 3 <= len(lengths) <= 6
+    assert (lengths[1:] <= (0.5 + 1e-6) * lengths[:-1]).all()  # 1e-6: the first damping is not zero

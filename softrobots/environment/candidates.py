@@ -16,7 +16,6 @@ from softrobots.environment.self_contact import different_contacts, near_pairs, 
 from softrobots.environment.single_bodies import Bends, Seen, Triple
 from softrobots.environment.single_pairs import single_pair
 
-_NOBODY = np.zeros(0, dtype=np.intp)
 _FEW = 40  # ends times bodies up to which plain numbers take less time than NumPy
 INSIDE = 2
 """Feature of the minimum between the ends of a core; 0 and 1 are start and end, larger numbers crossed borders."""

@@ -167,14 +167,15 @@ class Cores:
         return near, still[apart[near].argmin(axis=1)]
 
 
-class _KnownCores(threading.local):
-    """Cores of the models that the calling thread has used."""
+class Known(threading.local):
+    """What the calling thread has made for the models that it has used."""
 
     def __init__(self) -> None:
-        self.by_model: WeakKeyDictionary[SoftModel, Cores] = WeakKeyDictionary()
+        """Nothing yet."""
+        self.by_model: WeakKeyDictionary[SoftModel, Any] = WeakKeyDictionary()
 
 
-_KNOWN = _KnownCores()
+_KNOWN = Known()
 
 
 def cores_of(model: SoftModel) -> Cores:
@@ -186,4 +187,4 @@ def cores_of(model: SoftModel) -> Cores:
     """
     if check_model(model) not in _KNOWN.by_model:
         _KNOWN.by_model[model] = Cores(model, robot_capsules(model))
-    return _KNOWN.by_model[model]
+    return _KNOWN.by_model[model]  # type: ignore[no-any-return]

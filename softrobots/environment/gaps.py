@@ -124,8 +124,7 @@ class Gaps(Candidates):
                 points of the surface, shape (m, 3) [N].
 
         Returns:
-            The load on the joints; its potential is `-sum f . x`, that of dead forces. The derivative of normal forces is
-            :math:`\sum f_i\, d^2 g_i`.
+            The load on the joints, without a potential. The derivative of normal forces is :math:`\sum f_i\, d^2 g_i`.
         """
         normal = forces.ndim == 1
         rows = (forces if normal else np.abs(forces).max(axis=1, initial=0.0)).nonzero()[0]
@@ -155,7 +154,7 @@ class Gaps(Candidates):
                     by_force += wrench
                     angular += [weight * one for one in wrench]
                     owners.append(capsule)
-        potential, size = 0.0, 0.0
+        size = 0.0
         for capsule, v, p in loads:
             (x, y, z), (a, b, c), work = v, p, inner(v, p)
             by_force += (0.0, z, -y, a * x - work, a * y, a * z)  # three rows of -v x (u - p x w)
@@ -163,7 +162,7 @@ class Gaps(Candidates):
             by_force += (y, -x, 0.0, c * x, c * y, c * z - work)
             angular += _TURNS
             owners += (capsule, capsule, capsule)
-            potential, size = potential - work, size + math.hypot(x, y, z)
+            size += math.hypot(x, y, z)
         jacobian, moves = self.places.jacobian, self._cores.moves
         products = np.array(angular + by_force).reshape(-1, 6).dot(jacobian)
         factors = products.reshape(2, len(owners), -1) * moves.take(owners, 0)
@@ -174,7 +173,7 @@ class Gaps(Candidates):
             torque = np.add.reduce(wrenches * moves.take([capsule for capsule, _, _ in loads], 0))
         if normal and own:
             factors = np.concatenate([factors, self._curved_by_itself(own, forces)], axis=1)
-        return JointLoad(torque, factors[0], factors[1], None, None, potential, self.reach * size)
+        return JointLoad(torque, factors[0], factors[1], None, None, 0.0, self.reach * size)
 
     def _curved(self, row: int, force: float, at: tuple[Triple, float, Triple]) -> list[tuple[Any, float]]:
         r"""What the derivative of a normal force [N] of an obstacle has beside that of a dead one.

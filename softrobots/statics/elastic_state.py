@@ -19,7 +19,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.coordinates import Point, ReducedLoad
 from softrobots.model.friction_coordinates import MOST_ROUNDS, SAME_FRICTION, GuideFriction
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.contact.touch import NEAR, NO_FORCES, ForceTable, NearSurfaces, Touch, joined, resting_forces
+from softrobots.statics.contact.touch import NEAR, NO_FORCES, ForceTable, Touch, joined, resting_forces, surfaces_of, touch_at
 from softrobots.statics.loads import AppliedLoad, Load
 
 TOLERANCE = 1e-10
@@ -72,7 +72,7 @@ class ElasticProblem:
         self.model, self.q_motors, self.load, self.tolerance = model, q_motors, load, tolerance
         self._coordinates, self._springs, self._reach = model.coordinates, model.springs, model.reach
         self._applied = AppliedLoad(model, load)
-        self._surfaces = None if load.environment is None else NearSurfaces(model, load.environment)
+        self._surfaces = None if load.environment is None else surfaces_of(model, load.environment)
 
     def state(self, q_springs: FloatArray, forces: ForceTable = NO_FORCES, near: float = NEAR) -> ElasticState:
         """Evaluate residual, tangent stiffness and energy at elastic coordinates, shape (n_springs,) [rad or m].
@@ -83,10 +83,10 @@ class ElasticProblem:
         point = self._coordinates.at(self.q_motors, q_springs)
         if not point.valid:
             return _out_of_range(self.model, q_springs, point)
-        touch = None
-        joints = self._applied.nothing or self._applied.at(self.model.embed(point.joints))
+        touch, q = None, self.model.embed(point.joints)
+        joints = self._applied.nothing or self._applied.at(q)
         if self._surfaces is not None:
-            touch = self._surfaces.at(self.model.embed(point.joints), point, forces, near)
+            touch = touch_at(self._surfaces, q, point, forces, near * self._reach)
             joints = joined(joints, touch.load)
         reduced = point.reduce(joints)
         stored, torques, stiffness = self._springs.at(q_springs)

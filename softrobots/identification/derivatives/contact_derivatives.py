@@ -31,7 +31,7 @@ from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.certificate import active_contacts
 from softrobots.statics.contact.contact import Contact
 from softrobots.statics.contact.pressed_gaps import check_no_rubbing, motor_slopes
-from softrobots.statics.contact.touch import NEAR, NO_FORCES, NearSurfaces
+from softrobots.statics.contact.touch import NEAR, NO_FORCES, surfaces_of, touch_at
 from softrobots.statics.elastic_state import TOLERANCE, elastic_state, largest_residual
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.sensitivity import inverse_in_contact
@@ -129,7 +129,8 @@ class ContactDerivatives:
         """Pressed gaps and contact load of a robot at the same coordinates and forces; of other shape if other places touch."""
         found = self._equilibrium
         point = model.coordinates.at(found.q_motors, found.q_springs)
-        touch = NearSurfaces(model, environment).at(model.embed(point.joints), point, NO_FORCES, NEAR)
+        q, surfaces = model.embed(point.joints), surfaces_of(model, environment)
+        touch = touch_at(surfaces, q, point, NO_FORCES, NEAR * model.reach)
         numbers = {key: place for place, key in enumerate(touch.gaps.keys)}
         places = [numbers[key] for key in self._keys if key in numbers]
         if len(places) < len(self._keys):

@@ -25,7 +25,6 @@ STICKS = "sticks"
 SLIPS = "slips"
 """The force is on the cone of friction, against the slip."""
 
-
 _ONE_PLACE = 5e-5  # over the reach: a ball of that radius leaves a plane by 1.25e-9 there, more than surfaces that touch
 
 

@@ -15,7 +15,6 @@ SMALLEST = 2.0**-14
 EVENT = 2.0**-7
 """Largest step in which a contact is made or lost or begins to slip or stick, likewise."""
 
-
 PATIENT = 2.0**-4
 """Largest step that is tried again where Newton's method does not converge at once: halving a larger one takes less."""
 

@@ -7,13 +7,12 @@ With gaps :math:`g_i(y)` and normal forces :math:`\lambda_i`, the contacts load 
 
 from __future__ import annotations
 
-import threading
 from typing import Any, NamedTuple
-from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.environment.cores import Known
 from softrobots.environment.environment import Environment
 from softrobots.environment.gaps import Gaps, Surroundings
 from softrobots.environment.standing import standing_among
@@ -88,40 +87,28 @@ NO_FORCES = ForceTable((), np.zeros(0))
 """No contact force yet."""
 
 
-class _Known(threading.local):
-    """The last environment of each robot that the calling thread has used."""
-
-    def __init__(self) -> None:
-        self.by_model: WeakKeyDictionary[SoftModel, tuple[Environment, Surroundings]] = WeakKeyDictionary()
+_KNOWN = Known()
 
 
-_KNOWN = _Known()
+def surfaces_of(model: SoftModel, environment: Environment) -> Surroundings:
+    """Return the surfaces around a robot; each thread keeps those of its last environment."""
+    known = _KNOWN.by_model.get(model)
+    if known is None or known[0] is not environment:
+        known = _KNOWN.by_model[model] = environment, standing_among(model, environment)
+    return known[1]  # type: ignore[no-any-return]
 
 
-class NearSurfaces:
-    """The surfaces around one robot; belongs to the thread that created it."""
-
-    def __init__(self, model: SoftModel, environment: Environment) -> None:
-        """Take the robot and its environment."""
-        known = _KNOWN.by_model.get(model)
-        if known is None or known[0] is not environment:
-            known = _KNOWN.by_model[model] = environment, standing_among(model, environment)
-        self._surroundings, self._reach = known[1], model.reach
-
-    def at(self, q: FloatArray, point: Point, forces: ForceTable, near: float) -> Touch:
-        """Evaluate gaps and contact load at Pinocchio's configuration, shape (nq,), and the point of the coordinates there.
-
-        Gaps below `near` times the reach are seen.
-        """
-        gaps = self._surroundings.at(q, near * self._reach)
-        on_motors, on_springs = point.columns(gaps.jacobian)
-        each = forces.at(gaps)
-        deepest = max(0.0, -min(gaps.values.tolist(), default=0.0))
-        return Touch(gaps, on_springs, on_motors, each, gaps.load(each), self._surroundings, deepest)
+def touch_at(surroundings: Surroundings, q: FloatArray, point: Point, forces: ForceTable, margin: float) -> Touch:
+    """Evaluate gaps up to a margin [m] and contact load at Pinocchio's configuration, shape (nq,), and the point there."""
+    gaps = surroundings.at(q, margin)
+    on_motors, on_springs = point.columns(gaps.jacobian)
+    each = forces.at(gaps)
+    deepest = max(0.0, -min(gaps.values.tolist(), default=0.0))
+    return Touch(gaps, on_springs, on_motors, each, gaps.load(each), surroundings, deepest)
 
 
 def joined(applied: JointLoad, contact: JointLoad) -> JointLoad:
-    """Return a load with the load of contacts; contact forces have no potential."""
+    """Return a load with the load of contacts."""
     if not len(contact.angular):
         return applied
     moments = applied.by_moment
