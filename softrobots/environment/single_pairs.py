@@ -31,8 +31,6 @@ def single_pair(body: Body, start: Seen, end: Seen, length: float, limit: float,
     u, v, w = span = point[0] - a, point[1] - b, point[2] - c
     low, high = n[0] * u + n[1] * v + n[2] * w, m[0] * u + m[1] * v + m[2] * w  # slopes over shares
     between, found = low < 0.0 < high, [Found(0, 0.0, first, n), Found(1, 1.0, last, m)]
-    if not between and first > limit < last:  # the distance is convex along the core, and least at an end
-        return found
     kept: list[Found] = []
     before, after = (0.0, first, low, 0), (1.0, last, high, 1)  # the neighbours of the minimum
     for place, share in enumerate(body.borders(start.point, span)):

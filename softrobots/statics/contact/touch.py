@@ -95,7 +95,7 @@ def surfaces_of(model: SoftModel, environment: Environment) -> Surroundings:
     known = _KNOWN.by_model.get(model)
     if known is None or known[0] is not environment:
         known = _KNOWN.by_model[model] = environment, standing_among(model, environment)
-    return known[1]  # type: ignore[no-any-return]
+    return known[1]
 
 
 def touch_at(surroundings: Surroundings, q: FloatArray, point: Point, forces: ForceTable, margin: float) -> Touch:
