@@ -180,7 +180,7 @@ class ContactSearch:
         seen = min(NEAR, max(_LEAST_SEEN, 2.0 * _moved(whole)))  # steps shrink: what the next one may touch
         table = ForceTable.of(touch.gaps, touch.forces + change)
         trial = self.near(state.q_springs + whole, table, seen)
-        self._price = max(2.0 * float(np.add.reduce(step.forces)), 0.5 * self._price)
+        self._price = max(2.0 * sum(step.forces.tolist()), 0.5 * self._price)
         exact = step.exact and length <= _LARGEST_STEP and trial is not None and trial.touch.penetration <= deepest
         if trial is not None and exact and trial.error <= 0.5 * here.error:
             self._damp(False)
@@ -223,7 +223,7 @@ class ContactSearch:
 
 def _moved(step: FloatArray) -> float:
     """How far a step of the springs moves the robot at most, relative to the reach."""
-    return float(np.add.reduce(np.abs(step)))
+    return float(sum(map(abs, step.tolist())))
 
 
 def _back_to_surface(touch: Touch, soft: FloatArray) -> FloatArray | None:
