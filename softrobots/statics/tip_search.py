@@ -34,14 +34,12 @@ LEVER = 0.2
 WARM_DAMPING = 1e-6
 """Damping of the first step of a search that starts from a prediction, relative to the reach."""
 
-_FIRST_DAMPING = 0.03  # of the first step, relative to the reach
-_LAST_DAMPING = 1e-8
-_HALVINGS = 6  # of the way between two waypoints
+_FIRST_DAMPING, _LAST_DAMPING = 0.03, 1e-8  # of the first step, and the least, relative to the reach
+_HALVINGS, _MOST_STEPS = 6, 30  # of the way between two waypoints, and of each search there
 _LARGEST_STEP = 0.5  # [rad], norm of one step over the scale of the actuators
 _STATIONARY = 1e-8  # slope of the distance [m/rad per m of reach] that counts as zero: a local minimum
 _JUMP = 1.0  # change of an actuator between two waypoints, relative to its scale, that is no continuous motion
 _NO_NEARER = 1e-4  # share of the way to the goal in a step that is refused, with which shorter ones lead nowhere
-_MOST_STEPS = 30  # of a search from the waypoint before
 _NEAR = 0.02  # distance from the goal, relative to the reach, that a step home may cost
 
 
@@ -154,9 +152,8 @@ def search(
     if here is None:
         return None
     model, basis = tip.model, tip.model.actuators.basis
-    inverse = np.linalg.pinv(basis)
     mu, redundant, unsolved, pace = damping * model.reach, basis.shape[1] > tip.rows, 0, 1.0
-    home = q_motors if home is None else home
+    inverse, home = np.linalg.pinv(basis), q_motors if home is None else home
     last: tuple[FloatArray, FloatArray] | None = None  # last step and drift
     rubs, least = model.structure.friction is not None, LeastTension(here)
     refused, ease = 0, 0.1  # models of this state whose step did not lead nearer; change of the damping after one that does
