@@ -157,9 +157,8 @@ class TargetWay:
 
     def step(self, place: float, here: Rest, small: bool = True) -> Rest | None:
         """Put the tip to the target of a place; None if no small step of the robot does."""
-        number = min(int(place), len(self._goals) - 2)
+        number, work, idle, least, nearest = min(int(place), len(self._goals) - 2), 0.0, 0, np.inf, np.inf
         goal = self._goals[number].between(self._goals[number + 1], place - number)
-        work, idle, least, nearest = 0.0, 0, np.inf, np.inf
         for _ in range(_MOST_TURNS):
             tip = RubbingTip(self.given(here.q_motors), here.sliding, goal)
             found = tip.solve(here.q_motors, here.q_springs)
@@ -206,8 +205,7 @@ class TargetWay:
 
     def _least(self, tip: RubbingTip, motors: FloatArray, found: LocalSolution[Rest]) -> LocalSolution[Rest]:
         """Return the solution nearest to motors, of those that press the tip harder or less hard against its obstacle."""
-        actuators = self._model.actuators
-        inverse = np.linalg.pinv(actuators.basis)
+        actuators, inverse = self._model.actuators, np.linalg.pinv(self._model.actuators.basis)
         for _ in range(_MOST_NEARER):
             slope, follow = tip.motion(found.state)
             _, sizes, right = np.linalg.svd(slope @ actuators.basis)
@@ -238,8 +236,7 @@ class TargetWay:
             there = self.step(place, eased)
             if there is not None:
                 return there._replace(work=work + there.work)
-        number = min(int(place), len(self._goals) - 2) + 2
-        best = here.equilibrium()
+        number, best = min(int(place), len(self._goals) - 2) + 2, here.equilibrium()
         left = float(np.linalg.norm(self._goals[number - 1].position - best.tip_position))
         held = [f"{one.link!r} {one.status} on {one.obstacle!r} with {one.normal_force:.3g} N" for one in best.contacts]
         raise TargetUnreachable(
