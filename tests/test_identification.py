@@ -14,9 +14,10 @@ import pinocchio as pin
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from scipy.optimize import least_squares
 
 import softrobots as sr
-from softrobots.identification.fit import rho
+from softrobots.identification.weights import rho
 from softrobots.identification.identify import LOSSES
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
@@ -150,6 +151,23 @@ def test_what_twelve_tips_tell_weakly_comes_back_too() -> None:
     found = sr.identify(ARM, data, names)
     assert found.message == "converged"
     np.testing.assert_allclose(found.solution, true, rtol=1e-9)
+
+
+def test_masses_that_are_told_only_together_end_at_the_lowest_point_within_their_bounds() -> None:
+    """A valley that bends in the logarithm of the density; along it the cap would lose more than it weighs."""
+    names, true = ("stiffness", "density", "cap_mass"), [150.0, 1500.0, 0.13]
+    data = measured(ParameterSet.of(ARM, names), true, *rows(40, (0.9, 0.9, 0.9), 3.0), std=1e-3, seed=4, seen=("tip_position",))
+    found = sr.identify(ARM, data, names)
+    assert found.message == "converged"
+    chosen = ParameterSet.of(ARM, names)
+
+    def residuals(values: Any) -> Any:  # without our derivatives
+        return Predictor(chosen, data).at(values * true).differences()["positions.tip"].ravel() * 1e3
+
+    at = np.append(found.solution[:2], max(found.solution[2], 1e-9)) / true
+    theirs = least_squares(residuals, at, bounds=(0.0, np.inf), xtol=1e-12, ftol=1e-12, gtol=1e-12, x_scale=1e-3)
+    assert found.solution[2] == pytest.approx(0.0, abs=1e-9)
+    assert np.sum(residuals(found.solution / true) ** 2) <= 2.0 * theirs.cost * (1.0 + 1e-6)  # 1e-8 is where fits end
 
 
 LINKS = ("joint[spring_1_side,spring_1_up].stiffness", "joint[spring_2_side,spring_2_up].stiffness")

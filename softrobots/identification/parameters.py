@@ -124,9 +124,19 @@ class ParameterSet:
         return np.array([one.place.kind in OF_MODEL for one in self.parameters], dtype=bool)
 
     @cached_property
-    def direct(self) -> tuple[tuple[int, Parameter], ...]:
-        """Those that do not change the model, with their numbers, from 0."""
-        return tuple((number, one) for number, one in enumerate(self.parameters) if one.place.kind not in OF_MODEL)
+    def direct_slopes(self) -> Mapping[str, FloatArray]:
+        """Derivatives, 1 or 0, of what is set without changing the model, shape (size, P), by what has parameters.
+
+        "motor": the actuators; "base": its position, then rotation; "wrench": that at the tip; "gravity".
+        """
+        sizes, slopes = {"motor": self.present.n_motors, "base": 6, "wrench": 6, "gravity": 3}, dict[str, FloatArray]()
+        for number, one in enumerate(self.parameters):
+            kind = {"offset": "motor", "force": "wrench"}.get(one.place.kind, one.place.kind)
+            if kind in sizes:
+                turned = 3 if one.place.names == ("rotation",) else 0
+                rows = [part + turned for part in one.place.parts]
+                slopes.setdefault(kind, np.zeros((sizes[kind], len(self.parameters))))[rows, number] = 1.0
+        return slopes
 
     def places(self, kind: Kind) -> list[tuple[int, Parameter]]:
         """Return the parameters of a kind with their numbers, from 0."""

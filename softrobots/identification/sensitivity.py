@@ -18,7 +18,6 @@ from softrobots.identification.derivatives.frequency_derivatives import frequenc
 from softrobots.identification.derivatives.friction_derivatives import friction_loads
 from softrobots.identification.derivatives.rows_and_states import Outputs, States
 from softrobots.identification.model_change import present_change
-from softrobots.identification.parameter_names import LOADS
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
 from softrobots.model.friction_coordinates import memory_of
@@ -207,14 +206,11 @@ class Sensitivity(Summarised):
         if self._at.contact is not None:
             slopes += rows.by_contacts(parameters)[0]
         by_load = {name: one[0] for name, one in rows.by_loads().items()} if self._loaded else {}
-        by_kind = {"motor": rows.by_actuators[0], "offset": rows.by_actuators[0], "base": None, "gravity": by_load.get("")}
-        by_kind |= dict.fromkeys(("force", "wrench"), by_load.get(tip))
-        for place, one in parameters.direct:
-            kind, parts = one.place.kind, list(one.place.parts)
+        for kind, chosen in parameters.direct_slopes.items():
             if kind == "base":
-                slopes[:, place] += rows.by_base()[0][:, parts[0] + (3 if one.place.names[0] == "rotation" else 0)]
-            elif by_kind.get(kind) is not None:
-                slopes[:, place] = by_kind[kind][:, parts].sum(axis=1)
+                slopes += rows.by_base()[0] @ chosen
+            else:
+                slopes += (rows.by_actuators[0] if kind == "motor" else by_load["" if kind == "gravity" else tip]) @ chosen
         return slopes, by_load[tip][:, :3] if tip in by_load else np.zeros((len(slopes), 3))
 
     @property
@@ -225,14 +221,14 @@ class Sensitivity(Summarised):
     @cached_property
     def _loaded(self) -> set[str]:
         """Kinds of loads that derivatives are needed by."""
-        kinds = {str(one.place.kind) for _, one in self.parameters.direct} & set(LOADS)
-        return kinds if self.estimate is None else kinds | {"force"}
+        kinds = self.parameters.direct_slopes.keys() & {"wrench", "gravity"}
+        return kinds if self.estimate is None else kinds | {"wrench"}
 
     @cached_property
     def _at(self) -> EquilibriumDerivatives:
         states = States.of([self.equilibrium])
         loads = dict(states.loads)
-        if self._loaded - {"gravity"}:
+        if "wrench" in self._loaded:
             loads.setdefault(self._tip, np.zeros((1, 6)))
         if "gravity" in self._loaded:
             loads.setdefault("", np.zeros((1, 3)))
@@ -250,7 +246,7 @@ def sensitivity(
 
     By implicit differentiation at the state (`softrobots.identification.residual_derivatives`): exact to 1e-8, without solving
     for another equilibrium. The first call for a robot and names loads four robots for each name, which is kept. After that the
-    `gradient` of a new equilibrium, with all that is prepared for it, takes as long as two to three equilibria of an arm,
+    `gradient` of a new equilibrium, with all that is prepared for it, takes as long as two equilibria of an arm,
     0.8 of a tendon arm, whatever the number of parameters; a further one of the same equilibrium as long as 0.7 and 0.35.
 
     At a knee (the end of a plateau, a tendon that goes slack) they are the derivatives of the side that the state is on.

@@ -84,3 +84,18 @@ class Prior(NamedTuple):
     """Means, shape (k,)."""
     std: FloatArray
     """Standard deviations, shape (k,)."""
+
+
+def rho(loss: str, z: FloatArray) -> FloatArray:
+    """Return a loss of squared residuals, one of SciPy's `least_squares`, and its two derivatives, shape (3, rows)."""
+    one, none, near = np.ones_like(z), np.zeros_like(z), np.minimum(z, 1e60)  # whose powers do not overflow
+    if loss == "soft_l1":
+        return np.array([2.0 * (np.sqrt(1.0 + z) - 1.0), (1.0 + z) ** -0.5, -0.5 * (1.0 + z) ** -1.5])
+    if loss == "huber":
+        far = np.maximum(z, 1.0)
+        return np.where(z <= 1.0, [z, one, none], [2.0 * far**0.5 - 1.0, far**-0.5, -0.5 * far**-1.5])
+    if loss == "cauchy":
+        return np.array([np.log1p(z), 1.0 / (1.0 + near), -1.0 / (1.0 + near) ** 2])
+    if loss == "arctan":
+        return np.array([np.arctan(z), 1.0 / (1.0 + near**2), -2.0 * near / (1.0 + near**2) ** 2])
+    return np.array([z, one, none])

@@ -25,6 +25,11 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import cross, skew
 from softrobots.model.soft_model import SoftModel
 
+_FIRST_THEN_MASS, _MASS_THEN_FIRST = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])
+_TURNING = np.zeros((6, 6, 6))  # matrices of forces and moments of 1
+_TURNING[:3, 3:, :3] = _TURNING[:3, :3, 3:] = _TURNING[3:, 3:, 3:] = -skew(np.eye(3))
+_TURNING = _TURNING.reshape(6, 36)
+
 
 class Topology(NamedTuple):
     """The order and the joints of a robot; the base stands at the end of what has a row for each joint and one for it."""
@@ -102,17 +107,21 @@ class LoadedTree:
         placed = _placed(tree, joints)
         self.rotation, self.position = placed[..., :3, :3], placed[..., :3, 3]
         """Rotation, shape (N, n + 1, 3, 3), and position, (N, n + 1, 3) [m], of the joints, then of the base."""
-        self._origins, masses = np.ascontiguousarray(self.position[:, :-1]), numbers["masses"]
-        vectors = np.stack([tree.axes[:, :3], tree.axes[:, 3:], masses[:, 1:]], axis=-1)
-        along, about, levers = np.moveaxis(self.rotation[:, :-1] @ vectors, -1, 0)
-        self.axes = np.concatenate([along + cross(self._origins, about), about], axis=-1)
+        self._to_world: FloatArray = np.zeros((*self.position.shape[:2], 6, 6))  # of twists in the joints
+        self._to_world[..., :3, :3] = self._to_world[..., 3:, 3:] = self.rotation
+        self._to_world[..., :3, 3:] = skew(self.position) @ self.rotation
+        self.axes = (self._to_world[:, :-1] @ tree.axes[..., None])[..., 0]
         """World twist of each joint, at the origin, shape (N, n, 6)."""
         wrenches: FloatArray = np.zeros(self.axes.shape)
-        gravity = loads.get("")
-        self._gravity = None if gravity is None else gravity[:, None]
-        if self._gravity is not None:
-            self._first = levers + masses[:, :1] * self._origins
-            wrenches[..., :3], wrenches[..., 3:] = masses[:, :1] * self._gravity, cross(self._first, self._gravity)
+        turned: FloatArray = np.zeros((*self.axes.shape[:2], 3, 3))
+        gravity, self._weight = loads.get(""), None
+        if gravity is not None:
+            bodies, pull = numbers["masses"].take(_FIRST_THEN_MASS, -1)[..., None], skew(gravity)[:, None]
+            self._weight = np.zeros((*self.axes.shape, 4))  # on a body, of first moment and mass of 1
+            self._weight[..., :3, 3], self._weight[..., 3:, :] = gravity[:, None], -(pull @ placed[:, :-1, :3])
+            wrenches = (self._weight @ bodies)[..., 0]
+            self._first = (placed[:, :-1, :3] @ bodies)[..., 0]
+            turned = pull @ skew(self._first)
         self._loaded = []
         for frame, wrench in loads.items():
             if frame:
@@ -121,7 +130,8 @@ class LoadedTree:
                 if body >= 0:
                     wrenches[:, body] += wrench
                     wrenches[:, body, 3:] += cross(point, wrench[:, :3])
-        self._beyond = tree.beyond @ wrenches
+                    turned[:, body] += skew(wrench[:, :3]) @ skew(point)
+        self._wrenches, self._turned, self._beyond = wrenches, turned, tree.beyond @ wrenches
 
     @property
     def torque(self) -> FloatArray:
@@ -163,9 +173,7 @@ class LoadedTree:
         each = self.axes * joints[..., None]
         if placements is not None:
             moved = np.flatnonzero(np.any(placements, axis=(0, 2)))
-            parents, twists = self.topology.parents[moved], placements[:, moved]
-            linear, about = self._turned(parents, twists[..., :3]), self._turned(parents, twists[..., 3:])
-            each[:, moved] += np.concatenate([linear + cross(self.position[:, parents], about), about], axis=-1)
+            each[:, moved] += (self._to_world[:, self.topology.parents[moved]] @ placements[:, moved, :, None])[..., 0]
         return np.asarray(self.topology.beyond.T @ each)[:, :, None]
 
     def point_speed(self, name: str, twists: FloatArray | None, frames: FloatArray | None) -> FloatArray:
@@ -176,7 +184,8 @@ class LoadedTree:
             speed += twists[:, body, 0, :3] + cross(twists[:, body, 0, 3:], point)
         if frames is not None:
             moving = frames[:, self._model.frame_id(name)]
-            speed += self._turned(body, moving[:, :3] + cross(moving[:, 3:], np.broadcast_to(local, (len(moving), 3))))
+            there = moving[:, :3] + cross(moving[:, 3:], np.broadcast_to(local, (len(moving), 3)))
+            speed += (self.rotation[:, body] @ there[..., None])[..., 0]
         return speed
 
     def load_rates(self, forces: Mapping[str, FloatArray], masses: FloatArray | None, frames: FloatArray | None) -> FloatArray:
@@ -188,9 +197,8 @@ class LoadedTree:
             frames: Twists of the frames in their joints, shape (N or 1, k, 6).
         """
         wrenches: FloatArray = np.zeros(self.axes.shape)
-        if masses is not None and self._gravity is not None:
-            first = self._turned(slice(-1), masses[..., 1:]) + masses[..., :1] * self._origins
-            wrenches[..., :3], wrenches[..., 3:] = masses[..., :1] * self._gravity, cross(first, self._gravity)
+        if masses is not None and self._weight is not None:
+            wrenches = (self._weight @ masses.take(_FIRST_THEN_MASS, -1)[..., None])[..., 0]
         for one in self._loaded:
             if one.body >= 0 and one.name in forces:
                 wrenches[:, one.body, :3] += forces[one.name]
@@ -199,39 +207,25 @@ class LoadedTree:
                 wrenches[:, one.body, 3:] += cross(self.point_speed(one.name, None, frames), one.wrench[:, :3])
         return np.asarray((self.axes * (self.topology.beyond @ wrenches)).sum(-1))
 
-    def _turned(self, joints: Any, vectors: FloatArray) -> FloatArray:
-        """Vectors in the axes of joints, shape (N or 1, ..., 3), in those of the world, shape (N, ..., 3)."""
-        return np.asarray((self.rotation[:, joints] @ vectors[..., None])[..., 0])
-
     def work_slopes(self, twists: FloatArray, each: FloatArray) -> FloatArray:
         """Derivatives of the virtual work by the twist of what is from each joint on, shape (N, n, L, 6), from `twists`."""
-        before, force, moment = twists - each, self._beyond[:, :, None, :3], self._beyond[:, :, None, 3:]
-        by_twist: FloatArray = np.zeros(twists.shape)
-        by_twist[..., :3] = cross(force, before[..., 3:])
-        by_twist[..., 3:] = cross(force, before[..., :3]) + cross(moment, before[..., 3:])
-        carried: FloatArray = np.zeros((*twists.shape[:3], 3))
-        if self._gravity is not None:
-            carried += cross(self._shifts(twists), self._gravity[:, :, None])
-        for one in self._loaded:
-            if one.body >= 0:
-                turn = twists[:, one.body, :, 3:]
-                carried[:, one.body] += cross(self._speed(one, twists)[..., :3], one.wrench[:, None, :3])
-                carried[:, one.body] += cross(turn, one.wrench[:, None, 3:])
-        by_twist[..., 3:] += (self.topology.beyond @ carried.reshape(*carried.shape[:2], -1)).reshape(carried.shape)
-        return by_twist
+        own = _turning(self._wrenches)
+        own[..., :3], own[..., 3:, 3:] = 0.0, own[..., 3:, 3:] - self._turned
+        carried = twists @ own
+        beyond = (self.topology.beyond @ carried.reshape(*carried.shape[:2], -1)).reshape(carried.shape)
+        return np.asarray((twists - each) @ _turning(self._beyond) - beyond)
 
     def by_loads(self, twists: FloatArray) -> dict[str, FloatArray]:
         """Derivatives of the virtual work by the wrench at each frame, (N, L, 6), and by gravity, "", (N, L, 3)."""
         found = {one.name: self._speed(one, twists) for one in self._loaded}
-        return found if self._gravity is None else found | {"": self._shifts(twists).sum(axis=1)}
+        if self._weight is not None:
+            masses = self._numbers["masses"][:, :1, None]
+            found[""] = (masses * twists[..., :3] + cross(twists[..., 3:], self._first[:, :, None])).sum(axis=1)
+        return found
 
     def by_masses(self, twists: FloatArray) -> FloatArray | None:
         """Derivatives of the virtual work by mass and first moment of each body, shape (N, n, L, 4); None if weightless."""
-        if self._gravity is None:
-            return None
-        gravity = self._gravity[:, :, None]
-        by_mass = ((twists[..., :3] + cross(twists[..., 3:], self._origins[:, :, None])) * gravity).sum(-1, keepdims=True)
-        return np.concatenate([by_mass, cross(gravity, twists[..., 3:]) @ self.rotation[:, :-1]], axis=-1)
+        return None if self._weight is None else (twists @ self._weight).take(_MASS_THEN_FIRST, -1)
 
     def by_frames(self, twists: FloatArray) -> dict[str, FloatArray]:
         """Derivatives of the virtual work by twists of the loaded frames in their joints, shape (N, L, 6)."""
@@ -253,10 +247,7 @@ class LoadedTree:
 
     def _in_joint(self, joints: Any, wrenches: FloatArray) -> FloatArray:
         """Wrenches at the origin, shape (N, ..., L, 6), seen from joints, shape (...)."""
-        moved = wrenches.copy()
-        moved[..., 3:] -= cross(self.position[:, joints, None], wrenches[..., :3])
-        both = moved.reshape(*moved.shape[:-2], -1, 3) @ self.rotation[:, joints]
-        return np.asarray(both.reshape(moved.shape))
+        return np.asarray(wrenches @ self._to_world[:, joints])
 
     def _speed(self, one: _Loaded, twists: FloatArray) -> FloatArray:
         """Velocity and turn of a loaded frame, shape (N, L, 6)."""
@@ -264,10 +255,13 @@ class LoadedTree:
         speed[..., :3] += cross(speed[..., 3:], one.point[:, None])
         return speed
 
-    def _shifts(self, twists: FloatArray) -> FloatArray:
-        """Rate of mass times position of each body, shape (N, n, L, 3)."""
-        masses = self._numbers["masses"][:, :1, None]
-        return np.asarray(masses * twists[..., :3] + cross(twists[..., 3:], self._first[:, :, None]))
+
+def _turning(wrenches: FloatArray) -> FloatArray:
+    r"""Matrices, shape (..., 6, 6), from the right: twists to the derivatives of the work of the wrenches `(F, N)` by `(d, a)`.
+
+    They take `(v, omega)` to :math:`(F \times \omega, F \times v + N \times \omega)`.
+    """
+    return np.asarray(wrenches.reshape(-1, 6).dot(_TURNING).reshape(*wrenches.shape, 6))
 
 
 def _placed(tree: Topology, joints: FloatArray) -> FloatArray:
