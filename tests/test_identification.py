@@ -17,10 +17,10 @@ from hypothesis import strategies as st
 from scipy.optimize import least_squares
 
 import softrobots as sr
-from softrobots.identification.weights import rho
 from softrobots.identification.identify import LOSSES
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
+from softrobots.identification.weights import rho
 from softrobots.robots.parameter_file import read_robot, write_parameters
 from tests.conftest import CHECKOUT
 from tests.support.laws import law
@@ -156,7 +156,9 @@ def test_what_twelve_tips_tell_weakly_comes_back_too() -> None:
 def test_masses_that_are_told_only_together_end_at_the_lowest_point_within_their_bounds() -> None:
     """A valley that bends in the logarithm of the density; along it the cap would lose more than it weighs."""
     names, true = ("stiffness", "density", "cap_mass"), [150.0, 1500.0, 0.13]
-    data = measured(ParameterSet.of(ARM, names), true, *rows(40, (0.9, 0.9, 0.9), 3.0), std=1e-3, seed=4, seen=("tip_position",))
+    data = measured(
+        ParameterSet.of(ARM, names), true, *rows(40, (0.9, 0.9, 0.9), 3.0), std=1e-3, seed=4, seen=("tip_position",)
+    )
     found = sr.identify(ARM, data, names)
     assert found.message == "converged"
     chosen = ParameterSet.of(ARM, names)
