@@ -213,6 +213,17 @@ def test_the_unit_of_loads_that_a_stiffness_absorbs_is_told_by_its_ratio() -> No
 
 
 @pytest.mark.study
+@each_row(("field", "right"), (("stiffness", 190.0), ("cap_mass", 0.1), ("density", 1300.0)))
+def test_a_value_that_was_given_in_another_unit_is_told(field: str, right: float, weighed: sr.Measurements) -> None:
+    """A start a thousand times too large, or too small where the robot takes that; one at a third is nothing to tell."""
+    for factor, doubted in ((1e3, True), (1e-3, True), (3.0, False)):
+        if field != "density" or factor > 1.0:  # a wall of a thousandth of the mass is refused
+            fit = sr.identify(replace(sr.InflatableArm(stiffness=190.0), **{field: factor * right}), weighed, field)
+            assert fit.message == "converged"
+            assert [text.startswith(f"{field}: ") and "right unit" in text for text in hints(fit)] == [True] * doubted
+
+
+@pytest.mark.study
 @pytest.mark.parametrize("loads", ["gravity", "force"])
 def test_loads_of_wrong_sign_that_a_stiffness_absorbs_are_told(weighed: sr.Measurements, loads: str) -> None:
     """The stiffness grows until the wrong load has no effect; what is left is a small part of the motion by the motors."""

@@ -93,9 +93,21 @@ def load_units(found: Identification) -> list[str]:
             size = math.exp(sum(map(math.log, ratios.values())) / len(ratios))
             return [
                 f"{', '.join(ratios)}: {size:.4g} times what it was taken for, about {factor:.4g}, the ratio of {given} to "
-                f"{wanted}: are the loads in the right unit?"
+                f"{wanted}: are the loads, and that value, in the right unit?"
             ]
     return []
+
+
+def value_units(found: Identification) -> list[str]:
+    """The values that end about a thousand times, or a thousandth of, what they were taken for: that had another unit."""
+    units = dict(zip(found.names, (one.unit for one in found.parameters), strict=True))
+    ratios = {name: ratio for name, ratio in _ratios(found).items() if units[name] not in ("-", "rad")}
+    return [
+        f"{name}: {ratio:.3g} times the {found.values[name] / ratio:.4g} {units[name]} that it was taken for: was that in "
+        "the right unit (N mm and N/mm, g, g/cm^3 and mm are a thousand to one of SI)?"
+        for name, ratio in ratios.items()
+        if abs(abs(math.log(ratio)) - math.log(1e3)) < _OFF
+    ]
 
 
 def rescaled(found: Identification) -> bool:
@@ -104,10 +116,14 @@ def rescaled(found: Identification) -> bool:
 
 
 def _stiffness_ratios(found: Identification) -> dict[str, float]:
-    """Fitted stiffnesses and moduli, over the means of their priors or, without, the values from which the fit started."""
-    taken = {one.name: found.priors.get(one.name, (one.value,))[0] for one in found.parameters if one.logarithmic}
-    named = {name: value for name, value in taken.items() if re.search("stiffness|modulus", name)}
-    return {name: found.values[name] / value for name, value in named.items() if min(value, found.values[name]) > 0.0}
+    """The ratios of stiffnesses and moduli."""
+    return {name: ratio for name, ratio in _ratios(found).items() if re.search("stiffness|modulus", name)}
+
+
+def _ratios(found: Identification) -> dict[str, float]:
+    """Fitted positive values, over the means of their priors or, without, the values from which the fit started."""
+    taken = {one.name: found.priors.get(one.name, (one.value,))[0] for one in found.parameters if one.lower >= 0.0}
+    return {name: found.values[name] / value for name, value in taken.items() if min(value, found.values[name]) > 0.0}
 
 
 def _better(

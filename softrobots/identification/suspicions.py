@@ -22,7 +22,7 @@ from softrobots.identification.identify import identify
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
-from softrobots.identification.refits import STEPS, load_units, other_axes, other_loads, rescaled
+from softrobots.identification.refits import STEPS, load_units, other_axes, other_loads, rescaled, value_units
 from softrobots.model.soft_model import SoftModel, check_model
 
 FACTORS = (
@@ -64,13 +64,14 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
     few = slice(None, None, -(-len(rows) // _MOST_SOLVED))
     for key, values in found.fitted.predicted.items():
         measured, predicted, before = _points(rows.measured[key]), _points(values), len(texts)
+        others = np.delete(np.arange(len(rows)), found.outliers)  # single mistakes are no reason to fit again
         texts += suspicions(measured, predicted, rows.q_motors, name=key)
-        if key.startswith(("positions.", "poses.")) and _unexplained(measured, predicted) > UNEXPLAINED:
+        left = _unexplained(measured[others], predicted[others])
+        if key.startswith(("positions.", "poses.")) and left > UNEXPLAINED:
             texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
             texts += _reversed_actuators(found, key, few) if len(texts) == before else []
             texts += other_axes(found, key, few, progress) if len(texts) == before else []
-        doubted = _unexplained(measured, predicted) > UNEXPLAINED or rescaled(found)
-        if key.startswith(("positions.", "poses.")) and doubted and not texts:
+        if key.startswith(("positions.", "poses.")) and (left > UNEXPLAINED or rescaled(found)) and not texts:
             texts += other_loads(found, key, few, progress)
         if len(texts) == before and (share := _unexplained(measured, predicted)) > _MUCH:
             texts.append(
@@ -85,7 +86,7 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
                     f"{key}: what is left is {ratio:.2g} times the standard deviation that was given: the robot differs in "
                     "what is not fitted, or the standard deviation is larger; the intervals by rows are too narrow"
                 )
-    return texts + _far_from_priors(found)
+    return (texts or value_units(found)) + _far_from_priors(found)
 
 
 def suspicions(
