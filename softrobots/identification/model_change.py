@@ -14,7 +14,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
-from weakref import WeakSet
 
 import numpy as np
 
@@ -34,8 +33,6 @@ _UPWARDS: Stencil = (1e-5, {1: 2.0, 2: -0.5})
 _DOWNWARDS: Stencil = (1e-5, {-1: -2.0, -2: 0.5})
 _TYPICAL = {"m": 0.1, "Pa": 1e3}  # scales of parameters that may be zero, by unit; else 1
 _PLACED = ("placements", "frames")
-_MANY = 8  # parameters, from which on it pays to look for those that change different numbers, also if asked once
-_SEEN = WeakSet[ParameterSet]()  # sets that were asked for
 _ASIDE = 1e-3  # how far from the present values they are told, relative: by symmetry some change nothing there
 
 
@@ -132,8 +129,7 @@ def number_slopes(
 
     places = np.flatnonzero(parameters.of_model).tolist()
     alone: list[dict[int, Numbers]] = [{place: {}} for place in places]
-    groups = _apart(parameters, numbers) if len(places) >= _MANY or parameters in _SEEN else alone
-    _SEEN.add(parameters)
+    groups = _apart(parameters, numbers) if len(places) > 1 else alone
     for group in groups or alone:
         try:
             yield from list(each(group))
