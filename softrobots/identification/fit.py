@@ -153,7 +153,7 @@ class Fit:
         size = np.sqrt(self._loss(rows**2)[1])
         norms = np.linalg.norm(slopes, axis=0)
         norms[norms == 0.0] = 1.0
-        small = np.linalg.qr(np.column_stack([slopes / norms, rows]) * size[:, None], mode="r")
+        small: FloatArray = np.linalg.qr(np.column_stack([slopes / norms, rows]) * size[:, None], mode="r")  # type: ignore[assignment]
         positive = self._logarithmic
         for power in (1, 0, -1):
             most = np.where(positive, _MOST_LOST, np.inf)

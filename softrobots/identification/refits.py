@@ -136,7 +136,8 @@ def _better(
     start = ParameterSet.of(chosen.model([one.value for one in found.parameters]), found.names, rows.markers)
     options: dict[str, Any] = {"priors": found.priors, "loss": found.loss, "max_iterations": STEPS}
     left = dict[str, float]()
-    for words, change in with_progress(changes.items(), progress, label=f"other fits to {key}", unit="fit"):
+    shown = progress if changes else False
+    for words, change in with_progress(changes.items(), shown, label=f"other fits to {key}", unit="fit"):
         given = rows.arguments()
         given |= {name: given[name] | one if isinstance(one, dict) else one for name, one in change.items()}
         with contextlib.suppress(SoftRobotsError):

@@ -26,9 +26,9 @@ from softrobots.core.vectors import cross, skew
 from softrobots.model.soft_model import SoftModel
 
 _FIRST_THEN_MASS, _MASS_THEN_FIRST = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])
-_TURNING = np.zeros((6, 6, 6))  # matrices of forces and moments of 1
-_TURNING[:3, 3:, :3] = _TURNING[:3, :3, 3:] = _TURNING[3:, 3:, 3:] = -skew(np.eye(3))
-_TURNING = _TURNING.reshape(6, 36)
+_BLOCKS: FloatArray = np.zeros((6, 6, 6))  # matrices of forces and moments of 1
+_BLOCKS[:3, 3:, :3] = _BLOCKS[:3, :3, 3:] = _BLOCKS[3:, 3:, 3:] = -skew(np.eye(3))
+_TURNING = _BLOCKS.reshape(6, 36)
 
 
 class Topology(NamedTuple):
