@@ -125,15 +125,14 @@ class Fit:
         """
         best, costs = x, [self._cost(x)]
         while len(costs) <= _LEAPS and (len(costs) < 3 or costs[-1] < costs[-2]):
-            after, ends = list[float](), list[FloatArray]()
+            tried = list[tuple[float, FloatArray]]()
             for end in self._full_steps(x, lower, upper):
-                ends.append(end)
-                after.append(self._cost(end))
-                if after[-1] < costs[-1]:
+                tried.append((self._cost(end), end))
+                if tried[-1][0] < costs[-1]:
                     break
-            if not np.isfinite(min(after)):
+            cost, x = min(tried, key=lambda one: one[0])
+            if not np.isfinite(cost):
                 break
-            x = ends[int(np.argmin(after))]
             self._refresh(x)
             costs.append(self._cost(x))
             best = x if costs[-1] < min(costs[:-1]) else best
@@ -154,16 +153,13 @@ class Fit:
         norms = np.linalg.norm(slopes, axis=0)
         norms[norms == 0.0] = 1.0
         small: FloatArray = np.linalg.qr(np.column_stack([slopes / norms, rows]) * size[:, None], mode="r")  # type: ignore[assignment]
-        positive = self._logarithmic
         for power in (1, 0, -1):
-            most = np.where(positive, _MOST_LOST, np.inf)
-            low, high = (
-                np.maximum(lower - x, -most if power > 0 else -np.inf),
-                np.minimum(upper - x, most if power < 0 else np.inf),
-            )
+            most = np.where(self._logarithmic, _MOST_LOST, np.inf)
+            low = np.maximum(lower - x, -most if power > 0 else -np.inf)
+            high = np.minimum(upper - x, most if power < 0 else np.inf)
             step = lsq_linear(small[:, :-1], -small[:, -1], (low * norms, high * norms), method="bvls").x / norms
             if power:
-                step[positive] = power * np.log1p(power * step[positive])
+                step[self._logarithmic] = power * np.log1p(power * step[self._logarithmic])
             yield np.clip(x + step, lower, upper)
 
     def at_end(self) -> tuple[Prediction, FloatArray, FloatArray]:

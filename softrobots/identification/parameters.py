@@ -133,8 +133,7 @@ class ParameterSet:
         for number, one in enumerate(self.parameters):
             kind = {"offset": "motor", "force": "wrench"}.get(one.place.kind, one.place.kind)
             if kind in sizes:
-                turned = 3 if one.place.names == ("rotation",) else 0
-                rows = [part + turned for part in one.place.parts]
+                rows = np.array(one.place.parts) + 3 * (one.place.names == ("rotation",))
                 slopes.setdefault(kind, np.zeros((sizes[kind], len(self.parameters))))[rows, number] = 1.0
         return slopes
 
