@@ -16,7 +16,7 @@ from softrobots.compiled.motion.motion_groups import motion_groups
 from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run import motion_runs
 from softrobots.compiled.run.backends import make_run
-from softrobots.compiled.run.motion_course import Course, SpringKicks
+from softrobots.compiled.run.motion_course import Course
 from softrobots.compiled.run.motion_runs import take_one
 from softrobots.dynamics import gauss
 from softrobots.dynamics.equations import EquationsOfMotion
@@ -296,8 +296,9 @@ def test_stages_of_a_rod_that_twists_as_it_swings_have_matrices_of_their_own(
 def test_a_run_that_is_compared_ends_where_its_steps_have_too_many_parts(monkeypatch: pytest.MonkeyPatch) -> None:
     """At exactly as many as it may have it goes on; with given steps, which are not compared, it goes on with any number."""
     (model, start), grid = aside(3, 1.4), np.array([0.0, 0.1])
-    run, given, _ = sr.compile(model, backend="python")._motion_code((0.0, 0.0, -9.81), 0.0, 0.0, 4)
-    course = Course(MotorPath(model, (), 0.1), TimeLoad(model, None, None, 0.1), SpringKicks(model, []))
+    solver = sr.compile(model, backend="python")
+    run, given, _ = solver._motion_code((0.0, 0.0, -9.81), 0.0, 0.0, 4)
+    course = Course(MotorPath(model, (), 0.1), TimeLoad(model, None, None, 0.1), solver._spring_kicks)
     state, counted = (start.q_springs, np.zeros(model.n_springs)), run.workspace()
     for place, values in [*given, (run.layout.position, state[0]), (run.layout.time_step, grid[1:])]:
         run.put(counted, place, values)
