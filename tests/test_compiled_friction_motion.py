@@ -12,7 +12,7 @@ import pytest
 import softrobots as sr
 from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.support.c_libraries import Controller
-from tests.test_friction_motion import STICK, STIFFNESS, bar, bent, period, released, smooth
+from tests.support.friction_bars import STICK, STIFFNESS, bar, bent, period, released, smooth
 
 SAME = 1e-9  # relative: Newton's method of both engines ends at 1e-13 in a step, and friction halves what is left at each turn
 

@@ -11,39 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import softrobots as sr
-
-EI, LENGTH = 2e-3, 0.06
-STIFFNESS = EI / LENGTH  # of the bending of one section [N m/rad]
-STICK = 1e-4  # bending that a section gives before its friction is whole [rad]
-
-
-def bar(friction: float) -> sr.SoftModel:
-    """A bar that bends as one section: an oscillator of one degree of freedom, but for its slight shortening."""
-    return sr.load_model(
-        sr.TendonArm(
-            segment_lengths=(LENGTH,),
-            tendon_azimuths=(),
-            bending_stiffness=EI,
-            elastic_sections=1,
-            bending_friction=friction,
-        )
-    )
-
-
-def bent(model: sr.SoftModel, angle: float, friction: float) -> sr.Equilibrium:
-    """The bar, bent from rest by a moment."""
-    return sr.solve_equilibrium(model, [], wrench=(0.0, 0.0, 0.0, 0.0, STIFFNESS * angle + friction, 0.0))
-
-
-def smooth(share: float) -> float:
-    """From 0 to 1, at rest at both ends."""
-    s = min(max(share, 0.0), 1.0)
-    return s**3 * (10.0 - 15.0 * s + 6.0 * s * s)
-
-
-def period() -> float:
-    free = bar(0.0)
-    return 1.0 / float(sr.vibration_modes(free, sr.solve_equilibrium(free, [])).frequencies[1])
+from tests.support.friction_bars import EI, LENGTH, STICK, STIFFNESS, bar, bent, period, released, smooth
 
 
 def test_the_swings_of_an_oscillator_fall_by_the_same_each_time_until_it_sticks() -> None:
@@ -152,12 +120,6 @@ def test_given_lengths_move_against_friction_too() -> None:
     # Each way the moment is whole but for the stick, which is given back once; nothing moves at the end.
     assert motion.energy.dissipated[-1] == pytest.approx(2.0 * moment * angle, abs=4.0 * moment * STICK)
     assert motion.energy.motor_work[-1] == pytest.approx(motion.energy.dissipated[-1], rel=2e-3)  # midpoint steps: 100 of them
-
-
-def released(**fields: Any) -> tuple[sr.SoftModel, sr.Equilibrium]:
-    """An arm of two segments whose elastic tendons hold it bent, under a force."""
-    model = sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.05), elastic_sections=1, **fields))
-    return model, sr.solve_equilibrium(model, model.relaxed_motors - (2e-3, 0, 0, 0, 1e-3, 0), (0.1, 0.2, 0.0))
 
 
 @pytest.mark.parametrize("fields", [{"bending_friction": 5e-4}, {"guide_friction": 0.1}])

@@ -155,6 +155,14 @@ def test_an_error_crosses_to_another_process_as_it_is(text: str) -> None:
         assert (str(other), other.args, vars(other)) == (str(error), error.args, vars(error))
 
 
+@law("core.errors.short")
+@given(st.one_of(st.text(), st.binary(), st.lists(st.floats()), st.dictionaries(st.text(), st.integers())), st.integers(8, 90))
+def test_a_shortened_value_is_one_line_of_bounded_length(value: object, longest: int) -> None:
+    text, whole = errors.short(value, longest), repr(value)
+    assert "\n" not in text
+    assert text == whole if len(whole) <= longest else whole.startswith(text.removesuffix("...")) and len(text) == longest
+
+
 # --- Time and space
 
 

@@ -25,7 +25,7 @@ import numpy as np
 from softrobots.compiled.drivers import intrinsics
 from softrobots.compiled.program.generated_module import Program
 from softrobots.compiled.run.numpy_batches import MotionBatches, NumpyBatches
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, choice
 from softrobots.core.errors import MissingDependency, OutputError
 from softrobots.core.files import write_text
 
@@ -58,6 +58,19 @@ _INTRINSIC = "@intrinsic\ndef {name}(typing, {given}):\n    return lowered(KERNE
 def available_backend() -> str:
     """Return the preferred back end that is installed."""
     return "numba" if importlib.util.find_spec("numba") is not None else "python"
+
+
+def chosen_backend(backend: str | None) -> str:
+    """Return a back end that is installed, None: the preferred one.
+
+    Raises:
+        ParameterError: If it is unknown.
+        MissingDependency: If it is "numba" and numba is not installed.
+    """
+    chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
+    if chosen == "numba" and available_backend() != "numba":
+        raise MissingDependency("numba", "fast")
+    return chosen
 
 
 class Run:
@@ -196,12 +209,6 @@ def _guarded(function: Callable[..., int], careful: Callable[..., int]) -> Calla
             return status
 
     return run
-
-
-def require_numba() -> None:
-    """Raise MissingDependency if numba is not installed."""
-    if importlib.util.find_spec("numba") is None:
-        raise MissingDependency("numba", "fast")
 
 
 def make_run(program: Program, backend: str) -> Run:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterable
-from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from softrobots.compiled.run.backends import BACKENDS, available_backend, require_numba
+from softrobots.compiled.run.backends import chosen_backend
 from softrobots.compiled.run.batches import batch_rows, fail, flat_targets, gravity_vector, unusable, without
 from softrobots.compiled.run.compiled_dynamics import CompiledDynamics
 from softrobots.compiled.run.compiled_statics import DOUBLE, NO_FORCE
@@ -18,7 +17,7 @@ from softrobots.compiled.run.results import CompiledLoadEstimate, LoadBatch, Mot
 from softrobots.compiled.run.unrolled_search import UnrolledSearch
 from softrobots.compiled.statuses import Status
 from softrobots.constant_curvature.strain_chain import STRAINS
-from softrobots.core.checks import choice, finite_array, positive_integer, positive_number
+from softrobots.core.checks import finite_array, positive_integer, positive_number
 from softrobots.core.errors import LoadNotFound, ParameterError, TargetUnreachable
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.inverse_kinematics import solve_ik, start_motors
@@ -47,9 +46,7 @@ def compile_model(model: SoftModel, *, backend: str | None = None, locked_strain
         MissingDependency: If `backend` is "numba" and numba is not installed.
     """
     check_model(model)
-    chosen = available_backend() if backend is None else choice("backend", backend, BACKENDS)
-    if chosen == "numba":
-        require_numba()
+    chosen = chosen_backend(backend)
     if isinstance(locked_strains, str) or not isinstance(locked_strains, Iterable):
         raise ParameterError("locked_strains", locked_strains, f"a tuple of names, of {', '.join(STRAINS)}")
     return CompiledModel(model, chosen, tuple(locked_strains))
@@ -67,10 +64,6 @@ class CompiledModel(CompiledDynamics):
         """Read the robot, see `CompiledStatics`; call `softrobots.compile` instead."""
         super().__init__(*given)
         self._plain_estimate = self._plain and self._unknowns.moved_by_motors
-
-    @cached_property
-    def _estimate(self) -> Any:
-        return self._run(False).estimate
 
     def estimate_load(
         self, q_motors: Any, motor_torques: Any, *, gravity: Any = None, previous: Any = None
@@ -105,11 +98,11 @@ class CompiledModel(CompiledDynamics):
             and q_motors.shape == self._shape
             and motor_torques.shape == self._shape
         ):
-            _, size, layout = self._light
+            _, estimate, size, layout = self._light
             w = np.zeros(size)
             w[: self._motors] = q_motors
             w[layout.torques : layout.torques + self._motors] = motor_torques
-            if self._estimate(w) == 0:
+            if estimate(w) == 0:
                 return CompiledLoadEstimate(w, layout, self._actuation)
         return self._checked_estimate(q_motors, motor_torques, gravity, previous)
 

@@ -100,7 +100,7 @@ class CompiledStatics(CompiledCode):
         ):
             joints, down = self._joints, None if gravity is None else self._plain_gravity(gravity)
             if gravity is None or down is not None:
-                settle, size, layout = self._light if gravity is None else self._heavy
+                settle, _, size, layout = self._light if gravity is None else self._heavy
                 w = np.zeros(size)
                 if joints == self._motors:
                     w[:joints] = q_motors
@@ -126,7 +126,7 @@ class CompiledStatics(CompiledCode):
 
     def _single(self, weight: bool) -> Any:
         run = self._run(weight)
-        return run.settle, run.program.size, run.layout
+        return run.settle, run.estimate, run.program.size, run.layout
 
     def _plain_gravity(self, gravity: Any) -> FloatArray | None:
         """Return gravity that needs no check but that of the generated code: an array, or the tuple of the last call."""
