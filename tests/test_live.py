@@ -152,12 +152,28 @@ def test_without_a_way_from_the_last_springs_the_relaxed_ones_are_tried(
     cold = sr.solve_equilibrium(arm, (0.2, 0.5, -0.5), (0, 3, 0))
 
     def fails_warm(*arguments: object, **options: object) -> sr.Equilibrium:
-        if options.get("q_springs0") is not None:
+        if options.get("previous") is not None:
             raise sr.EquilibriumNotFound("none", best=None, residual=1.0, iterations=1)
         return sr.solve_equilibrium(*arguments, **options)
 
     monkeypatch.setattr(warm_start, "solve_equilibrium", fails_warm)
     assert np.array_equal(next_equilibrium(last, (0.2, 0.5, -0.5), (0, 3, 0)).q_springs, cold.q_springs)
+
+
+def test_friction_remembers_from_one_command_to_the_next() -> None:
+    """A tendon bends a segment by the constant moment `T d`, with friction a play operator: it gives way between two lines."""
+    stiffness, distance, length, moment = 2e-3, 0.0045, 0.06, 2e-3
+    fields = {"bending_stiffness": stiffness, "tendon_distance": distance, "bending_friction": moment, "elastic_sections": 2}
+    rod = sr.load_model(sr.TendonArm(segment_lengths=(length,), tendon_azimuths=(0.0,), kind="tension", **fields))
+    last, bend = sr.solve_equilibrium(rod, (0.0,)), 0.0
+    for tension in (2.0, 4.0, 3.5, 1.0, 0.0, 3.0):
+        last = next_equilibrium(last, (tension,))
+        bend = min(max(bend, tension * distance - moment), tension * distance + moment)
+        assert last.q_springs[1::4].sum() == pytest.approx(bend * length / stiffness, abs=4.04e-4)  # two sticks a section
+    back = sr.solve_equilibrium(rod, (1.5,), previous=last)  # beyond the play, 2 moment / distance
+    found = next_solution(last, back.tip_position)
+    assert found.q_motors == pytest.approx([1.5], abs=1e-6)  # one that nothing has moved has the tip there at 2.4 N
+    assert found.equilibrium.q_springs == pytest.approx(back.q_springs, abs=1e-8)
 
 
 def test_a_solution_follows_on_from_the_last_one_also_beyond_the_limits(arm: sr.SoftModel) -> None:

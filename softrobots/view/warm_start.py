@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from softrobots.core.errors import EquilibriumNotFound, TargetUnreachable
+from softrobots.model.friction_coordinates import after_step
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
 from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 
@@ -23,19 +24,20 @@ def next_equilibrium(last: Equilibrium, q_motors: Any, force: Any = None, *, gra
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
 
     Returns:
-        The equilibrium that `solve_equilibrium` finds from the springs of `last`, or else from relaxed springs.
+        The equilibrium that `solve_equilibrium` finds from `last`, or else, without dry friction, from relaxed springs.
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range.
-        EquilibriumNotFound: If there is none from relaxed springs either.
+        EquilibriumNotFound: If there is none from there either.
     """
-    model = last.model
+    model, rubs = last.model, last.model.structure.friction is not None
     motors, obstacles = model.checked_motors(q_motors), last.load.environment
-    if model.coordinates.at(motors, last.q_springs).valid:
+    if rubs or model.coordinates.at(motors, last.q_springs).valid:
         try:
-            return solve_equilibrium(model, motors, force, gravity=gravity, q_springs0=last.q_springs, environment=obstacles)
+            return solve_equilibrium(model, motors, force, gravity=gravity, previous=last, environment=obstacles)
         except EquilibriumNotFound:
-            pass
+            if rubs:
+                raise
     return solve_equilibrium(model, motors, force, gravity=gravity, environment=obstacles)
 
 
@@ -58,9 +60,10 @@ def next_solution(last: Equilibrium, target: Any, force: Any = None, *, gravity:
         EquilibriumNotFound: If there is no equilibrium at any of the starts.
     """
     given = {"gravity": gravity, "environment": last.load.environment}
-    low, high = last.model.motor_limits.T
+    model = after_step(last.model, last.q_motors, last.q_springs)
+    low, high = model.motor_limits.T
     start = last.q_motors if np.all((last.q_motors >= low) & (last.q_motors <= high)) else None
     try:
-        return solve_ik(last.model, target, force, q_motors0=start, starts=1, **given)
+        return solve_ik(model, target, force, q_motors0=start, starts=1, **given)
     except (TargetUnreachable, EquilibriumNotFound):
-        return solve_ik(last.model, target, force, q_motors0=start, starts=_STARTS, **given)
+        return solve_ik(model, target, force, q_motors0=start, starts=_STARTS, **given)
