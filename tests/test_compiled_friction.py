@@ -276,7 +276,6 @@ def test_a_force_comes_back_from_the_tensions_and_the_state_before(fields: dict[
 @pytest.mark.parametrize(
     ("call", "words"),
     [
-        (lambda fast: fast.js_source(), "without dry friction, for solvers on pages"),
         (lambda fast: fast.equilibrium([1.0], environment=sr.Environment([])), "without dry friction, for compiled contact"),
         (lambda fast: fast.equilibrium([1.0], previous=1), "an Equilibrium of the model"),
         (lambda fast: fast.equilibria([1.0], np.zeros(3), previous=[]), "at least one state"),

@@ -26,6 +26,10 @@ ROBOTS: dict[str, Callable[[], Any]] = {
     "helix": sr.HelixTube,
     "lumped": lambda: sr.PccArm(chain="lumped"),
 }
+RUBBING = sr.TendonArm(
+    segment_lengths=(0.08,), kind="tension", elastic_sections=3, bending_friction=1e-3, guide_friction=0.2, tendon_force=20.0
+)
+"""Dry friction of both kinds: what this one shows depends on the way there."""
 STARTS = {"arm": {"q_motors": (0.3, 0.6, -0.8), "force": (0, 10, -15)}, "helix": {"gravity": sr.EARTH_GRAVITY}}
 SIZES = {"wide": (760, 460), "phone": (390, 844), "frame": (400, 460)}
 
@@ -62,7 +66,7 @@ class Tab:
 
 @pytest.fixture(scope="module")
 def models() -> dict[str, sr.SoftModel]:
-    return {name: sr.load_model(robot()) for name, robot in ROBOTS.items()}
+    return {name: sr.load_model(robot()) for name, robot in ROBOTS.items()} | {"rubbing": sr.load_model(RUBBING)}
 
 
 @pytest.fixture(scope="module")
@@ -342,6 +346,85 @@ def test_the_address_holds_the_state(open_tab: Callable[..., Tab]) -> None:
         "force": [1, 2, -3],
         "gravity": [0, 0, -1.62],
     }
+
+
+def walked(model: sr.SoftModel, last: sr.Equilibrium | None, wanted: dict[str, Any], at: dict[str, Any]) -> sr.Equilibrium:
+    """Go where the page goes, with the general solver: a step is at most a fiftieth of a slider, here of each tension."""
+    ways = {name: np.subtract(wanted[name], at[name]) for name in ("motors", "force")}
+    full = 2.0 * visible_force(model)
+    longest = max(np.abs(ways["motors"]).max() / 20.0, np.abs(ways["force"]).max() / full)
+    steps = max(1, int(np.ceil(50.0 * longest - 1e-9)))
+    for step in range(1, steps + 1):
+        motors, force = (np.array(at[name]) + ways[name] * step / steps for name in ("motors", "force"))
+        last = sr.solve_equilibrium(model, motors, force, previous=last)
+    assert last is not None
+    return last
+
+
+@pytest.mark.study
+def test_a_slider_draws_the_loop_of_friction(open_tab: Callable[..., Tab], models: dict[str, sr.SoftModel]) -> None:
+    """Up and down by the slider, and with a force beside it: each pose is that of `solve_equilibrium(previous=)` in the same
+    steps, to 1e-9, as above. Reset forgets, and a link leads from rest to its state."""
+    model, tab = models["rubbing"], open_tab("rubbing")
+    slider, facts = tab.page.get_by_role("slider", name="tendon_1_1"), tab.page.locator("#friction")
+    assert facts.is_visible()
+    assert "Dry friction" in facts.inner_text()
+    assert not tab.page.locator("#mode").is_visible()  # a tip that is dragged is pulled
+    at, last, loop = tab.shown(), None, []
+    start = at["tip"]
+    for pull in (6.0, 12.0, 11.8, 6.0, 0.0, 6.0, 12.0):
+        slider.fill(str(pull))
+        shown = tab.shown(lambda shown, pull=pull: shown["motors"][0] == pull)
+        last = walked(model, last, shown, at)
+        np.testing.assert_allclose(shown["drawnTip"], last.tip_position, rtol=0, atol=1e-9)
+        at, loop = shown, [*loop, shown["tip"][0]]
+    up, top, back, down, zero, again, closed = loop
+    assert top - back < 2e-3 * top  # it sticks
+    assert down - up > 0.1 * top  # the other side of the loop
+    assert zero > 1e-3
+    np.testing.assert_allclose((again, closed), (up, top), rtol=1e-6)  # the loop closes: what slips all the way forgets
+    force = (0.1 * visible_force(model) * np.array([1.0, 2.0, 0.0])).tolist()
+    tab.run("given => { softrobots.set(given); }", {"motors": [4.0, 3.0, 0.0], "force": force})
+    shown = tab.shown()
+    last = walked(model, last, shown, at)
+    np.testing.assert_allclose(shown["tip"], last.tip_position, rtol=0, atol=1e-9)
+    state = "#" + tab.page.url.partition("#")[2]
+    linked, origin = open_tab("rubbing", "wide", state).shown(), {"motors": np.zeros(3), "force": np.zeros(3)}
+    np.testing.assert_allclose(linked["tip"], walked(model, None, linked, origin).tip_position, rtol=0, atol=1e-9)
+    assert np.abs(np.subtract(linked["tip"], shown["tip"])).max() > 1e-3
+    tab.page.get_by_role("button", name="Reset").click()
+    np.testing.assert_allclose(tab.shown(lambda shown: shown["motors"] == [0.0] * 3)["tip"], start, rtol=0, atol=1e-12)
+    slider.fill("6")
+    np.testing.assert_allclose(tab.shown(lambda shown: shown["motors"][0] == 6.0)["tip"][0], up, rtol=0, atol=1e-12)
+
+
+@pytest.mark.study
+def test_a_way_with_friction_ends_where_it_leads_no_further(
+    open_tab: Callable[..., Tab], models: dict[str, sr.SoftModel]
+) -> None:
+    """What is shown is the last certified pose on the way, from which the next change goes on; a tip that was pulled stays."""
+    tab = open_tab("rubbing")
+    before = tab.shown()
+    found = tab.run("softrobots.set({motors: [200, 0, 0]})")
+    stopped = tab.shown()
+    assert found["statusText"] == stopped["failed"] == "a section is at the end of its range"
+    assert "last certified pose" in tab.page.inner_text("#status")
+    assert 50.0 < stopped["motors"][0] < 100.0
+    tab.run("softrobots.set({motors: [60, 0, 0]})")
+    model, here = models["rubbing"], sr.solve_equilibrium(models["rubbing"], (40.0, 0.0, 0.0))
+    for way in (stopped["motors"][0], 60.0):  # of one tendon steps of any size lead to the same
+        for pull in np.linspace(here.q_motors[0], way, 12)[1:]:
+            here = sr.solve_equilibrium(model, (pull, 0.0, 0.0), previous=here)
+    np.testing.assert_allclose(tab.shown()["tip"], here.tip_position, rtol=0, atol=1e-9)
+    tab.page.get_by_role("button", name="Reset").click()
+    tab.shown(lambda shown: shown["failed"] == "" and shown["tip"] == before["tip"])
+    drag(tab, 60, -40)
+    pulled = tab.shown(lambda shown: shown["force"] != before["force"])
+    tab.page.get_by_role("button", name="No force").click()
+    let_go = tab.shown(lambda shown: shown["force"] == [0, 0, 0])
+    moved, left = (np.subtract(one["tip"], before["tip"]) for one in (pulled, let_go))
+    assert pulled["force"] @ moved > 0.0
+    assert 0.01 * np.linalg.norm(moved) < np.linalg.norm(left) < np.linalg.norm(moved)
 
 
 def test_the_page_works_in_the_frame_of_a_notebook(browser: Any, models: dict[str, sr.SoftModel]) -> None:

@@ -35,6 +35,14 @@ ROBOTS: dict[str, tuple[Any, float, float]] = {
 """Robots, size of the forces on their tips [N], and how far actuators go from relaxed to anywhere within their limits [-].
 
 Residuals are relative to the tensions, too: under the largest ones 1e-10 of them moves a tip by 2 nm."""
+RUBBING: dict[str, tuple[Any, float, float]] = {
+    "bent, both frictions": (
+        sr.TendonArm(kind="tension", elastic_sections=2, rest_bend_x=0.7, bending_friction=5e-4, guide_friction=0.2),
+        0.1,
+        0.1,
+    ),
+    "PCC, guides": (sr.PccArm(elastic_sections=2, guide_friction=0.1), 1.0, 0.1),
+}
 KERNEL = '''"""Text."""
 
 N = 2
@@ -93,7 +101,7 @@ function $settle(w, flag)
 
 @cache
 def compiled(name: str) -> sr.CompiledModel:
-    return sr.compile(sr.load_model(ROBOTS[name][0]), backend="python")
+    return sr.compile(sr.load_model((ROBOTS | RUBBING)[name][0]), backend="python")
 
 
 @cache
@@ -221,6 +229,35 @@ def test_answers_are_those_of_python(browser: Any, name: str) -> None:
             assert np.abs(np.array(shown) - carried).max(initial=0.0) < 1e-7
     assert certified > 40
     assert slack > 0 or name not in ("tendons", "PCC, elastic")
+
+
+@pytest.mark.system
+@pytest.mark.parametrize("name", RUBBING)
+def test_steps_with_dry_friction_are_those_of_python(browser: Any, name: str) -> None:
+    """Each from the state before: springs are those of `solve_equilibrium` to 1e-9, as above, and what friction remembers
+    that of the same code in Python, to rounding."""
+    model, (_, size, share) = compiled(name).model, RUBBING[name]
+    drawn = model.actuators.draw(np.random.default_rng(4)) - model.relaxed_motors
+    parts = np.array([0.2, 1.0, 0.9, 0.0, 0.8, 0.4])  # of the way there, at last on the way back
+    cases = [
+        {"motors": (model.relaxed_motors + part * share * drawn).tolist(), "force": [part * size, 0.0, 0.0]} for part in parts
+    ]
+    code = """cases => { let from = null; return cases.map((one) => { from = solver.solve({...one, from});
+      return {...from, springs: [...from.springs], memory: from.memory.map((part) => [...part])}; }); }"""
+    slow = fast = None
+    for case, found in zip(cases, in_browser(browser, name, code, cases), strict=True):
+        slow = sr.solve_equilibrium(model, case["motors"], case["force"], previous=slow)
+        fast = compiled(name).equilibrium(case["motors"], case["force"], previous=fast)
+        assert found["status"] == Status.CERTIFIED
+        assert found["springs"] == pytest.approx(slow.q_springs, abs=1e-9)
+        assert found["tip"] == pytest.approx(slow.tip_position, abs=1e-9)
+        assert found["tensions"] == pytest.approx(slow.muscle_forces, abs=1e-7)
+        bending, slip = found["memory"]
+        rows = np.reshape(bending, (-1, 4))[: len(fast.friction_bending), :2]  # bend_x and bend_y of each section
+        assert rows == pytest.approx(fast.friction_bending, abs=1e-12)
+        assert slip == pytest.approx(fast.friction_slip, abs=1e-12)
+    from_rest = sr.solve_equilibrium(model, cases[-1]["motors"], cases[-1]["force"])
+    assert np.abs(from_rest.tip_position - found["tip"]).max() > 1e-5 * model.reach  # the way matters
 
 
 @pytest.mark.system

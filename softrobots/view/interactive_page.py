@@ -34,7 +34,8 @@ def write_interactive(
 
     Sliders move motors or muscles, the force on the tip and gravity; the tip can be dragged. The solver in the page is that of
     `softrobots.compile`: each pose is in balance and certified stable. `window.softrobots.solve({motors, force, gravity})` in
-    the page returns tip, springs and status.
+    the page returns tip, springs and status. With dry friction a change is a way in small steps from what is shown, and a tip
+    that is dragged moves no motors.
 
     Args:
         model: A robot that `softrobots.compile` takes.

@@ -9,6 +9,7 @@ import numpy as np
 
 from softrobots.compiled.browser.links import inflated_links
 from softrobots.compiled.browser.tensions import tension_places
+from softrobots.compiled.chain.layout import Layout
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.program.generated_module import Program
@@ -56,6 +57,7 @@ def script(model: SoftModel, unknowns: Unknowns, program: Program, *, gravity: b
         "links": inflated_links(model, unknowns.chain, shape.frames),
         "consistent": CONSISTENT,
         "misfit": _misfit(unknowns.chain),
+        "memory": _memory(unknowns, layout),
     }
     pieces = [
         comment([f"Equilibria of {unknowns.chain.name}, written by softrobots: makeSolver() returns a solver."]),
@@ -94,6 +96,15 @@ def _misfit(chain: SerialChain) -> list[list[float]] | None:
         return None
     arms = chain.muscle_paths.at(chain.rest).arms
     return [[float(one) for one in row] for row in np.eye(len(arms)) - arms @ chain.spread]
+
+
+def _memory(unknowns: Unknowns, layout: Layout) -> list[dict[str, object]]:
+    """Return what dry friction remembers: its place before a step and after it, and the numbers of a robot at rest."""
+    if not layout.rubbing:
+        return []
+    rest = [float(unknowns.chain.rest[one]) for one in unknowns.strains]
+    places = ((layout.sliders, layout.slid, rest), (layout.anchors, layout.anchored, [0.0] * layout.guides))
+    return [{"before": before, "after": after, "rest": numbers} for before, after, numbers in places]
 
 
 def _finite(limit: float) -> float | None:

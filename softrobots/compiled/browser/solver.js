@@ -94,8 +94,9 @@ function makeSolver() {
   const units = [...new Set(ROBOT.actuators.map((one) => one.unit))].join(", ");
   const names = ROBOT.actuators.map((one) => one.name);
 
-  function put(motors, force, gravity) {
+  function put(motors, force, gravity, memory) {
     w.fill(0.0);
+    ROBOT.memory.forEach(({ before, rest }, k) => w.set(memory === null ? rest : memory[k], before));
     w.set(motors.slice(0, ROBOT.joints), 0);
     if (ROBOT.muscles > 0) {
       $put_muscles(w, Float64Array.from(motors.slice(ROBOT.joints)));
@@ -121,16 +122,16 @@ function makeSolver() {
     if (!ROBOT.gravity && down.some((one) => one !== 0.0)) {
       throw new TypeError(`gravity: [${down.join(", ")}] came; required: none, this script was written without gravity`);
     }
-    put(given, load, down);
+    if (from !== null && !(from.unknowns instanceof Float64Array && from.unknowns.length === ROBOT.unknowns)) {
+      throw new TypeError(`from: ${String(from)} came; required: a result of solve of the same robot`);
+    }
+    put(given, load, down, from === null ? null : from.memory);
     let status;
     if (!admitted(given)) {
       status = $NOT_A_NUMBER;
     } else if (from === null) {
       status = $settle(w);
     } else {
-      if (!(from.unknowns instanceof Float64Array) || from.unknowns.length !== ROBOT.unknowns) {
-        throw new TypeError(`from: ${String(from)} came; required: a result of solve of the same robot`);
-      }
       for (let i = 0; i < ROBOT.unknowns; i += 1) {
         w[$UNKNOWN + i] = from.unknowns[i] + (ROBOT.started ? w[$START + i] - from.start[i] : 0.0);
       }
@@ -138,6 +139,7 @@ function makeSolver() {
     }
     const tip = Array.from(w.subarray($TIP, $TIP + 3));
     const unknowns = w.slice($UNKNOWN, $UNKNOWN + ROBOT.unknowns);
+    const memory = ROBOT.memory.map(({ after, rest }) => w.slice(after, after + rest.length));
     const residual = Math.sqrt(w[$ERROR]);
     $look_at_shape(w);
     const placements = w.slice(ROBOT.placementsPlace, ROBOT.placementsPlace + 12 * ROBOT.frames.length);
@@ -156,10 +158,11 @@ function makeSolver() {
       links,
       tensions: tensionsOf(w),
       unknowns,
+      memory,
       start: w.slice($START, $START + ROBOT.unknowns),
     };
   }
 
   const { name, actuators, springs, statuses, frames } = ROBOT;
-  return { name, actuators, springs, statuses, frames, solve };
+  return { name, actuators, springs, statuses, frames, rubs: ROBOT.memory.length > 0, solve };
 }

@@ -14,7 +14,6 @@ from softrobots.compiled.trace.numbers import TableInputs
 from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.step_control import order_of_steps
-from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
 
 
@@ -124,7 +123,8 @@ class CompiledCode:
         - `name`; `actuators`, each `{name, unit, lower, upper, relaxed}` (a limit that is not there is null); `springs`, each
           `{name, unit}`; `statuses`, by number `{name, text}`; `frames`, each `{name, kind, share}`;
         - `solve({motors, force, gravity, from})`. Motors [rad, m, N or Pa] are an array or an object by name. Force [N] and
-          gravity [m/s^2], world axes, may be left out: none. `from` is an earlier result near which the search starts.
+          gravity [m/s^2], world axes, may be left out: none. `from` is an earlier result near which the search starts, and of a
+          robot with dry friction (`rubs` is true) the state before, whose friction remembers; without it nothing has moved.
 
         The result of `solve` has `status` and `statusText` (see `Status`), `tip` [m], `springs` (as `Equilibrium.q_springs`),
         `residual` [N m], `minPivot` (the smallest pivot of the tangent stiffness, by its spring's own) and `placements`: for
@@ -139,11 +139,10 @@ class CompiledCode:
             points: Number of placements along a section.
 
         Raises:
-            ParameterError: If `points` is not positive, or the robot has dry friction.
+            ParameterError: If `points` is not positive.
         """
         from softrobots.compiled.browser.script import script
 
-        check_frictionless(self._model, "solvers on pages")
         positive_integer("points", points, 1000)
         return script(self._model, self._unknowns, self._run(gravity).program, gravity=gravity, points=points)
 

@@ -120,5 +120,7 @@ $("gravity").addEventListener("change", () => {
 });
 
 $("rest").addEventListener("change", draw);
-$("motors").hidden = $("mode").hidden = !actuators.length;
+$("motors").hidden = !actuators.length;
+$("mode").hidden = solver.rubs || !actuators.length;
+$("friction").hidden = !solver.rubs;
 $("rest-row").hidden = !data.solids.some((solid) => solid.elastic);

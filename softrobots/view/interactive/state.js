@@ -68,6 +68,7 @@ function readAddress() {
       Object.entries(given).map(([name, text]) => [name, text === "off" ? null : list(text)]),
     );
     show(setting);
+    if (solver.rubs) shown = null; // a link does not tell what friction remembers
   } catch (error) {
     console.warn(`the state in the address is not read: ${error.message}`);
   }
