@@ -12,7 +12,7 @@ import pytest
 import softrobots as sr
 from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.support.c_libraries import Controller
-from tests.support.friction_bars import STICK, STIFFNESS, bar, bent, period, released, smooth
+from tests.support.friction_bars import STICK, STIFFNESS, arm, bar, bent, period, released, smooth
 
 SAME = 1e-9  # relative: Newton's method of both engines ends at 1e-13 in a step, and friction halves what is left at each turn
 
@@ -56,20 +56,26 @@ ROBOTS: dict[str, sr.PccArm | sr.TendonArm] = {
     "winding": sr.TendonArm(
         segment_lengths=(0.06, 0.06), elastic_sections=1, routing=WINDING, kind="elastic", bending_friction=(2e-3, 0.0)
     ),
+    "guides": sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1, kind="elastic", guide_friction=0.3),
+    "guides, lengths": sr.PccArm(segment_lengths=(0.5,), elastic_sections=2, guide_friction=0.3, bending_friction=0.05),
+    "guides, lumped": sr.PccArm(segment_lengths=(0.5,), kind="tension", chain="lumped", hinges=2, guide_friction=0.3),
+    "guides, winding": sr.TendonArm(
+        segment_lengths=(0.06, 0.06), elastic_sections=1, routing=WINDING, kind="length", guide_friction=(0.3, 0.1)
+    ),
 }
 
 
 def path(name: str, model: sr.SoftModel) -> Any:
     """Muscles that are pulled and let go, those of given lengths with jumps of their velocities."""
-    if name == "lumped":
+    if "lumped" in name:
         return lambda time: np.array([6.0, 1.0, 0.0]) * (smooth(time / 0.02) - smooth(time / 0.02 - 1.0))
-    pull = BENDING if name == "lengths" else np.array([-4e-3, 2e-3, 0.0])
-    if name == "lengths":
+    pull = BENDING if name.endswith("lengths") else np.array([-4e-3, 2e-3, 0.0])
+    if name.endswith("lengths"):
         return lambda time: np.asarray(model.relaxed_motors + pull * min(time / 0.02, 1.0))
     return lambda time: np.asarray(model.relaxed_motors + pull * smooth(time / 0.02))
 
 
-@pytest.mark.parametrize("name", ["lumped", *(pytest.param(one, marks=pytest.mark.study) for one in ("lengths", "winding"))])
+@pytest.mark.parametrize("name", ["lumped", *(pytest.param(one, marks=pytest.mark.study) for one in ROBOTS if one != "lumped")])
 def test_motion_is_that_of_the_general_solver(name: str) -> None:
     model = sr.load_model(ROBOTS[name])
     options: dict[str, Any] = {"time_step": 5e-3, "output_step": 0.02, "gravity": (0.5, 0.0, -9.8), "force": (0.0, 0.1, 0.0)}
@@ -78,18 +84,38 @@ def test_motion_is_that_of_the_general_solver(name: str) -> None:
     fast = compiled(model)
     found = fast.simulate(0.04, driven, **options)
     assert_same(found, expected)
-    loose = sr.load_model(replace(ROBOTS[name], bending_friction=0.0))
+    loose = sr.load_model(replace(ROBOTS[name], bending_friction=0.0, guide_friction=0.0))
     free = sr.simulate(loose, 0.04, driven, **options)
-    assert np.abs(free.q_springs - expected.q_springs).max() > 1e-2 * np.abs(expected.q_springs).max()  # friction is felt
+    assert np.abs(free.q_springs - expected.q_springs).max() > 1e-3 * np.abs(expected.q_springs).max()  # friction is felt
     options["forces"] = [options.pop("force"), (0.0, 0.0, 0.0)]
     batch = fast.simulations(0.04, driven, **options)
     np.testing.assert_allclose(batch.q_springs[0], found.q_springs, rtol=0, atol=1e-12)
 
 
 @pytest.mark.study
-def test_motions_go_on_from_others_and_from_files(tmp_path: Path) -> None:
+def test_slow_motion_is_a_path_of_equilibria() -> None:
+    """A tendon is pulled and let go within 2.4 s, where vibrations last 0.1 s: `solve_equilibrium` from state to state."""
+    model = arm("tension", guide_friction=0.4, bending_friction=1e-3)
+
+    def pull(time: float) -> np.ndarray:
+        return np.array([3.0 * smooth(time) - 2.0 * smooth(time - 1.2)])
+
+    motion = compiled(model).simulate(2.4, pull, time_step=0.02, output_step=1.2, damping_time=0.05)
+    found = None
+    states = [found := sr.solve_equilibrium(model, pull(time), previous=found) for time in np.linspace(0.3, 2.4, 8)]
+    for row, state in ((1, states[3]), (2, states[-1])):
+        assert motion.q_springs[row] == pytest.approx(state.q_springs, abs=0.5 * STICK)
+    loose = sr.solve_equilibrium(arm("tension"), pull(2.4))
+    assert np.abs(states[-1].q_springs - loose.q_springs).max() > 100.0 * STICK  # friction is felt
+    assert np.abs(motion.energy.balance).max() < 1e-6 * motion.energy.motor_work.max()  # of torques and energies by Pinocchio
+    assert np.diff(motion.energy.dissipated).min() > 0.0
+
+
+@pytest.mark.study
+@pytest.mark.parametrize("fields", [{"bending_friction": 5e-4}, {"guide_friction": 0.1}])
+def test_motions_go_on_from_others_and_from_files(fields: dict[str, float], tmp_path: Path) -> None:
     """Two halves are the whole, alone and in a batch: the second remembers where the sliders of the first are."""
-    model, start = released(bending_friction=5e-4)
+    model, start = released(**fields)
     fast = compiled(model)
     options: dict[str, Any] = {"time_step": 1e-3, "output_step": 0.01}
     whole = fast.simulate(0.02, start.q_motors, start=start, **options)
@@ -117,9 +143,10 @@ def test_motions_go_on_from_others_and_from_files(tmp_path: Path) -> None:
 
 
 @pytest.mark.study
-def test_steps_in_c(tmp_path: Path) -> None:
+@pytest.mark.parametrize("guides", [0.0, 0.2])
+def test_steps_in_c(guides: float, tmp_path: Path) -> None:
     """One step after the other, as a controller calls it, which keeps what friction remembers in the array."""
-    model = sr.load_model(sr.PccArm(segment_lengths=(0.5,), elastic_sections=1, bending_friction=0.05))
+    model = sr.load_model(sr.PccArm(segment_lengths=(0.5,), elastic_sections=1, bending_friction=0.05, guide_friction=guides))
     fast, step = compiled(model), 5e-3
 
     def lengths(time: float) -> np.ndarray:
@@ -157,9 +184,7 @@ def test_machine_code_takes_chosen_steps() -> None:
     assert fine.q_springs[-1, 1] < -band  # it has swung to the other side, and turned round
 
 
-def test_friction_of_guides_is_refused_by_name() -> None:
-    fast = compiled(sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1, guide_friction=0.1)))
-    with pytest.raises(sr.ParameterError, match="without friction of guides, for compiled motion; simulate has it"):
-        fast.simulate(0.1, fast.model.relaxed_motors)
+def test_single_steps_refuse_friction_by_name() -> None:
+    fast = compiled(bar(1e-3))
     with pytest.raises(sr.ParameterError, match="without dry friction, for single steps"):
-        fast.step(fast.model.rest, fast.model.rest, fast.model.relaxed_motors)
+        fast.step(fast.model.rest, fast.model.rest, [])

@@ -193,7 +193,7 @@ class Routes:
         beside = [self.beside.get(row, ()) for row in range(count)]
         pairs, k = [one for row in beside for one in row], self.stride
         rows, past = ([size(row) if row in self.beside else 0 for row in range(count)] for size in (self.rows, self.past))
-        tables = {} if chain.guides is None else self._guide_tables(chain.guides)
+        tables = {} if chain.guides is None else self.guide_tables(chain.guides)
         return tables | {
             "FIRST_BESIDE": (0, *accumulate(len(one) for one in beside)),
             "FIRST_POINT": (0, *accumulate(len(one.paths) for one in pairs)),
@@ -210,7 +210,7 @@ class Routes:
             "COMPONENT_SQUARE": self.square,
         }
 
-    def _guide_tables(self, friction: DryFriction) -> dict[str, object]:
+    def guide_tables(self, friction: DryFriction) -> dict[str, object]:
         """Return the tables of `guides.RUB` and of `guide_drivers`; guides are in the order of the paths of the actuators."""
         chain, segments = self.unknowns.chain, self.unknowns.segments
         paths = chain.muscle_paths
@@ -218,6 +218,9 @@ class Routes:
         places = np.array([[self.unknowns.place.get(one, -1) for one in row] for row in paths.places.tolist()])
         strains = np.append(chain.rest, 0.0)[paths.places]
         turned, slope = friction.turns
+        pieces = np.stack([paths.turned, np.zeros(len(paths.length)), paths.length], axis=-1)
+        turned = np.concatenate([turned, pieces[:, None]], axis=1)
+        slope = np.concatenate([slope, np.concatenate([paths.across, paths.arms[:, None]], axis=1)[:, None]], axis=1)
         rest = turned + (slope @ np.where(places < 0, strains, 0.0)[:, None, :, None])[..., 0]
         slope = np.where((places < 0)[:, None, None], 0.0, slope)
         return {
@@ -226,6 +229,8 @@ class Routes:
             "N_RUBBING": len(chain.actuators),
             "FIRST_GUIDE": (*paths.starts.tolist(), len(paths.muscle)),
             "GUIDE_AT": tuple(self.points + self.record * point[one] + POINT_RECORD for one in range(len(point))),
+            "GUIDE_LENGTH": tuple((paths.length + 0.5 * paths.turned**2 / paths.length).tolist()),
+            "GUIDE_LUMPED": tuple(np.where(paths.separable, paths.length, 0.0).tolist()),
             "GUIDE_STICK": tuple(friction.stick.tolist()),
             "GUIDE_REST": tuple(friction.beyond_at_rest.tolist()),
             "GUIDE_COEFFICIENT": tuple(friction.coefficient.tolist()),

@@ -77,18 +77,23 @@ UNKNOWN: int
 
 # Places in the workspace of motion, see `softrobots.compiled.motion.motion_layout`.
 ACCELERATION: int
+ANCHORS: int
 BEGIN_POSITION: int
 BEGIN_VELOCITY: int
 BEYOND: int
 CHANGE: int
 COASTS: int
 COUPLED: int
+DISPLACED: int
 FAILED: int
+GUIDE_SLOPE: int
+INVERSE: int
 LAG: int
 LAST_CHANGE: int
 LAST_STEP: int
 LINE: int
 LINE_STRAIN: int
+MIDDLE: int
 MOTORS: int
 MOTORS_BEGIN: int
 MOTORS_END: int
@@ -101,6 +106,8 @@ RATE: int
 RATE_BEGIN: int
 SETTLED: int
 SHARE: int
+SHARES: int
+SIDES: int
 SLIDERS: int
 STRAIN_BEGIN: int
 STRAIN_CORRECTION: int
@@ -132,6 +139,10 @@ FIRST_GUIDE: tuple[int, ...]
 GROUP: tuple[int, ...]
 GUIDE_AT: tuple[int, ...]
 GUIDE_COEFFICIENT: tuple[float, ...]
+GUIDE_LENGTH: tuple[float, ...]
+GUIDE_LUMPED: tuple[float, ...]
+GUIDE_REST: tuple[float, ...]
+GUIDE_STICK: tuple[float, ...]
 GUIDE_STRAIN: tuple[int, ...]
 GUIDE_TURN: tuple[float, ...]
 LEAST_INPUT: tuple[float, ...]
@@ -168,6 +179,11 @@ bend_slack_walls: Callable[[Array], None]
 place_section: Callable[[Array, int, int, int, int, int], None]
 place_slide: Callable[[Array, int, int, int, int, int], None]
 place_turn: Callable[[Array, int, int, int, int, int], None]
+
+# Passes of motion over the chain.
+correct_all: Callable[[Array], None]
+reduce_all: Callable[[Array], None]
+start_reduce: Callable[[Array], None]
 
 # Straight-line functions of motion.
 apply_correction: Callable[[Array, int], None]

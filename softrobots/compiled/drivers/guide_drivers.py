@@ -15,23 +15,26 @@ from softrobots.compiled.drivers.lane_drivers import Places, Rows, load_case, st
 from softrobots.compiled.settings import *
 
 
-def turn_at(w: Array, guide: int, row: int) -> float:
-    """Return a component of the turn of the body (0 to 2) or of the tangent (3 to 5) at a guide."""
-    at = 30 * guide + 5 * row
+def turn_at(w: Array, place: int, guide: int, row: int) -> float:
+    """Return a component of the turn of the body (0 to 2), of the tangent (3 to 5), or of the piece (6 to 8) at a guide.
+
+    The strains are from `place` on; the piece is in axes of which the last is along it.
+    """
+    at = 45 * guide + 5 * row
     total = GUIDE_TURN[at]
     for i in range(4):
-        total += GUIDE_TURN[at + 1 + i] * w[UNKNOWN + GUIDE_STRAIN[4 * guide + i]]
+        total += GUIDE_TURN[at + 1 + i] * w[place + GUIDE_STRAIN[4 * guide + i]]
     return total
 
 
-def angle_at(w: Array, guide: int) -> float:
-    """Return the angle by which an actuator turns in a guide [rad]."""
-    x = turn_at(w, guide, 0)
-    y = turn_at(w, guide, 1)
-    z = turn_at(w, guide, 2)
-    a = turn_at(w, guide, 3)
-    b = turn_at(w, guide, 4)
-    c = turn_at(w, guide, 5)
+def angle_at(w: Array, place: int, guide: int) -> float:
+    """Return the angle by which an actuator turns in a guide, at strains from `place` on [rad]."""
+    x = turn_at(w, place, guide, 0)
+    y = turn_at(w, place, guide, 1)
+    z = turn_at(w, place, guide, 2)
+    a = turn_at(w, place, guide, 3)
+    b = turn_at(w, place, guide, 4)
+    c = turn_at(w, place, guide, 5)
     u = y * c - z * b
     v = z * a - x * c
     t = x * b - y * a
@@ -65,7 +68,7 @@ def grip(w: Array, rounds: int) -> float:
         if before > largest:
             largest = before
         for guide in range(FIRST_GUIDE[m], FIRST_GUIDE[m + 1]):
-            exponent = GUIDE_COEFFICIENT[guide] * angle_at(w, guide)
+            exponent = GUIDE_COEFFICIENT[guide] * angle_at(w, UNKNOWN, guide)
             along = exponent * w[GUIDE_AT[guide] + 4]
             mean = mean_decay(along)
             off = before * exponent * mean - w[GRIPS + guide]

@@ -14,10 +14,12 @@ from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.complex_numbers import ComplexScalar
 from softrobots.compiled.trace.expressions import Scalar
 from softrobots.dynamics.gauss import EIGENVALUE, GaussRule
+from softrobots.model.dry_friction import DryFriction
 
-_COUNTS = ("unknowns", "full_damping", "order", "strains", "coasting", "rubbing", "prepared")  # no places for callers
+_COUNTS = ("unknowns", "full_damping", "order", "strains", "coasting", "rubbing", "guides", "prepared")  # no places for callers
+_GUIDES = ("anchors", "shares", "grips", "guide_slope", "displaced", "inverse")
 _RUBBING = ("sliders", "strain_begin", "rate_begin", "beyond", "lag", "line", "line_strain")
-_INNER = ("stages", "forces", "mass_damping", "mass_rate", *_RUBBING)  # places that some robots do not have
+_INNER = ("stages", "forces", "mass_damping", "mass_rate", *_GUIDES, *_RUBBING)  # places that some robots do not have
 
 
 @dataclass(frozen=True)
@@ -43,6 +45,8 @@ class MotionLayout:
     """Whether steps are guessed from the linear equations of the step before, too."""
     rubbing: bool = False
     """Whether there is dry friction."""
+    guides: int = 0
+    """Number of guides of actuators that rub (G)."""
     motor_velocities: int = field(init=False)
     """Their velocities there (m) [rad/s or m/s]."""
     motor_accelerations: int = field(init=False)
@@ -121,6 +125,18 @@ class MotionLayout:
     """Accelerations of the unknowns at both stages (2, n)."""
     forces: int = field(init=False)
     """What is out of balance on them there (n, 2)."""
+    shares: int = field(init=False)
+    """Friction of each guide over its limit, from -1 to 1 (G); from here to `anchors` where guides rub only."""
+    grips: int = field(init=False)
+    """Friction of each guide that slips (G) [N]."""
+    guide_slope: int = field(init=False)
+    """Slopes of each piece of an actuator by the four strains there (4 G)."""
+    displaced: int = field(init=False)
+    """Strains from which friction acts in the middle of a step (N), see `softrobots.dynamics.friction_steps`."""
+    inverse: int = field(init=False)
+    """Inverse of the matrix of a step (N, N)."""
+    anchors: int = field(init=False)
+    """Length beyond each guide at which its slider stands before the step, beyond that at rest (G) [m]."""
     sliders: int = field(init=False)
     """The sliders of dry friction of each strain before the step (N) [rad]; from here to `line_strain` with friction only."""
     strain_begin: int = field(init=False)
@@ -161,7 +177,9 @@ class MotionLayout:
         stages = dict(stages=(k - 1) * 2 * n, forces=k * (self.strains or 0) if k == 2 or full or self.rubbing else 0)
         count = (self.strains or 0) * self.rubbing
         rubbing = {name: count for name in _RUBBING} | dict(line=n * self.rubbing)
-        parts = given | middle | state | before | path | search | stages | rubbing
+        each, some = self.guides, count * (self.guides > 0)
+        guides = dict(shares=each, grips=each, guide_slope=4 * each, displaced=some, inverse=some * count, anchors=each)
+        parts = given | middle | state | before | path | search | stages | guides | rubbing
         assign_places(self, m, **parts, prepared=0)
 
     def constants(self) -> dict[str, int]:
@@ -170,8 +188,8 @@ class MotionLayout:
         places = {name.upper(): place for name, place in vars(self).items() if name not in left_out}
         if self.strains is not None and self.full_damping:
             places |= {"MASS_DAMPING": self.mass_damping, "MASS_RATE": self.mass_rate}
-        if self.rubbing:
-            places |= {name.upper(): getattr(self, name) for name in _RUBBING}
+        for name in (*(_RUBBING if self.rubbing else ()), *(_GUIDES if self.guides else ())):
+            places[name.upper()] = getattr(self, name)
         return places | {"MOTORS": 0, "N_MOTORS": self.motors, "N": self.unknowns}
 
 
@@ -185,6 +203,8 @@ class MotionPlan:
     """Whether the damping is a matrix."""
     order: int = 2
     """Order of the steps."""
+    guides: DryFriction | None = None
+    """The friction of actuators in their guides."""
 
     @cached_property
     def layout(self) -> MotionLayout:
@@ -194,7 +214,8 @@ class MotionPlan:
         routed = replace(unknowns, chain=unknowns.chain.joined).routed
         coasting = self.order == GaussRule.order and strains is not None and not self.full_damping and not routed
         given = len(unknowns.chain.limits), count, self.full_damping, self.order, strains, coasting
-        return MotionLayout(*given, bool(unknowns.chain.friction))
+        guides = 0 if self.guides is None else self.guides.n_guides
+        return MotionLayout(*given, bool(unknowns.chain.friction) or guides > 0, guides)
 
     @cached_property
     def routes(self) -> MotionRoutes | None:

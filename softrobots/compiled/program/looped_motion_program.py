@@ -8,11 +8,14 @@ import numpy as np
 
 from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.unrolled_chain import place_base
+from softrobots.compiled.drivers import guide_motion_drivers
+from softrobots.compiled.drivers.guide_drivers import angle_at, mean_decay, turn_at
 from softrobots.compiled.motion.gauss_step import copy_block, place_block
 from softrobots.compiled.motion.looped_motion import SOLVERS, GroupLayout, group_kinds, load_frame, store_frame
 from softrobots.compiled.motion.motion_groups import motion_groups, reach_behind
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import MovingFrame, joint_state, moved
+from softrobots.compiled.program.generated_module import functions_of, text_of
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_actuators import actuator_parts
 from softrobots.compiled.program.motion_parts import MotionParts, coast_text
@@ -45,6 +48,15 @@ _DAMP = """    for stage in range(N_STAGES):
 """
 _FREE = """    for stage in range(N_STAGES):
         free_torques_SUFFIX(w, stage)
+"""
+_DISPLACE = "    displace(w)\n"
+_HOLD = """    rub_guides(w, 1.0)
+    find_multipliers_SUFFIX(w, 0)
+    find_pulls_SUFFIX(w)
+    rub_guides(w, -1.0)
+"""
+_RUB = """    grip_guides(w)
+    rub_guides(w, 1.0)
 """
 _STAGES = '''def resist_stages_SUFFIX(w: Array) -> None:
     """Evaluate both stages side by side."""
@@ -109,7 +121,11 @@ def _control(plan: MotionPlan, bends: bool) -> str:
         articulate = articulate.replace(_FACTOR, _either("    couple_all_SUFFIX(w)\n", _FACTOR))
         solve = _either(solve.replace("_all", "_coupled_all"), solve)
     massive = _MASSIVE if plan.layout.full_damping else ""
-    resist += _DAMP + massive + _FREE if held else massive
+    rub = "" if plan.guides is None else _DISPLACE + (_HOLD if held else "") + _RUB
+    resist += _DAMP + massive + rub + _FREE if held else massive + rub
+    if plan.guides is not None:
+        articulate = _ARTICULATE
+        solve = "    hold_guides(w)\n    factor_border_SUFFIX(w)\n" + solve
     evaluate = ("    resist_stages_SUFFIX(w)\n", "") if in_stages else (move, resist)
     text = _CONTROL.replace("FACTOR", evaluate[0] + articulate + evaluate[1] + solve)
     text = text.replace("CORRECT", "".join(evaluate) + solve)
@@ -172,11 +188,14 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     tables |= {"N_STRAINS": n, "N_BENDS": n * places.stages, "N_STAGES": places.stages, "RATES": _rates(plan, places)}
     tables |= {} if actuators is None else actuators.tables
     end = _END.replace("CLOSE", _CLOSE if held else "") if layout.rubbing else ""
+    end += "    slide(w, STRAIN_BEGIN, 1.0)\n" if plan.guides else ""
     control = (("" if actuators is None else actuators.after) + _control(plan, bends) + end).strip()
+    drivers = (turn_at, angle_at, mean_decay, *functions_of(guide_motion_drivers)) if plan.guides else ()
     loops, lane_loops = (
         [
             *([] if actuators is None else actuators.loops(suffix)),
             *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
+            *map(text_of, drivers),
             control.replace("_SUFFIX", suffix).replace("w[COUPLED]", flag),
         ]
         for suffix, flag in (("", "w[COUPLED]"), ("_lanes", "w[COUPLED * LANES]"))

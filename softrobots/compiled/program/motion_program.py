@@ -17,7 +17,6 @@ from softrobots.compiled.program.looped_motion_program import looped_motion
 from softrobots.compiled.program.manual import Place, inputs_of, motor_names, on_a_line, place_table, strain_names
 from softrobots.compiled.program.motion_parts import unrolled_motion
 from softrobots.compiled.statuses import Status
-from softrobots.core.errors import ParameterError
 
 _STATUSES = {
     Status.CERTIFIED: "the step was taken",
@@ -26,15 +25,8 @@ _STATUSES = {
 
 
 def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order: int = 2) -> Program:
-    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix; `order`: of the steps.
-
-    Raises:
-        ParameterError: If it has friction of guides.
-    """
-    if unknowns.chain.guides is not None:
-        requirement = "a robot without friction of guides, for compiled motion; simulate has it, guide_friction=0 leaves it out"
-        raise ParameterError("model", unknowns.chain.name, requirement)
-    plan = MotionPlan(in_motion(unknowns), full_damping, order)
+    """Generate the code of the motion of a robot; `full_damping`: whether the damping is a matrix; `order`: of the steps."""
+    plan = MotionPlan(in_motion(unknowns), full_damping, order, unknowns.chain.guides)
     layout = plan.layout
     parts = unrolled_motion(plan) if plan.unknowns.is_unrolled else looped_motion(plan)
     blocks = [*parts.blocks, *step_blocks(layout)]
@@ -82,6 +74,8 @@ def _manual(plan: MotionPlan) -> tuple[str, list[str]]:
         given.append(Place("MASS_RATE", 1, "Rayleigh's factor [1/s]"))
     given.append(Place("POSITION", n, f"unknowns at the beginning [rad or m]: {coordinates}"))
     given.append(Place("VELOCITY", n, "their velocities [rad/s or m/s]"))
+    if layout.guides:
+        given.append(Place("ANCHORS", layout.guides, "length beyond each guide at its slider, from rest, after a step [m]"))
     if layout.rubbing:
         count, carried = layout.strains or 0, "; the next step begins there"
         given.append(Place("SLIDERS", count, "bending that friction holds, as a step leaves it, of every strain [rad]"))

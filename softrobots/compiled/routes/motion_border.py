@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.trace.blocks import Block
@@ -78,6 +80,10 @@ def correct_strains_SUFFIX(w: Array) -> None:
 
 '''
 """Loops over the border; a factor of the stiffness counts where tensions follow the lengths, not where lengths are given."""
+
+_PASSES = r"start_reduce_SUFFIX\(w\)\s+reduce_all_SUFFIX\(w\)\s+correct_all_SUFFIX"
+BORDER_WITH_GUIDES = re.sub(_PASSES, "solve_held", BORDER)
+"""The same with the inverse of `guide_motion_drivers` instead of passes over the chain."""
 
 
 class _Numbers:

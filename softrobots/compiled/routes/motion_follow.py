@@ -80,6 +80,7 @@ def find_tensions(routes: MotionRoutes, number: int, segment: Segment) -> Block:
         tag = chain.actuators[muscle]
         pull = tension(tag.kind, law_numbers(tag), block.load(chain.n_motors + muscle), beyond)
         block.store(own.tensions + place, pull.value)
+        block.store(own.pulled + muscle, pull.value)
         if muscle in segment.stretched:
             block.store(routes.stiffness + routes.stretched.index(muscle), pull.slope)
     return block

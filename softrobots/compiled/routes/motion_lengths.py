@@ -100,9 +100,8 @@ def find_dampers_SUFFIX(w: Array, stage: int) -> None:
             add_free_SUFFIX(w, DAMPERS + N_STAGES * FREE_PLACE[k] + stage, DAMPER, k)
 
 
-def free_torques_SUFFIX(w: Array, stage: int) -> None:
-    """Take what holds the lengths from the torques out of balance, and add those of the dampers."""
-    arms = ARMS + N_BORDER * N_STRAINS * stage
+def find_multipliers_SUFFIX(w: Array, stage: int) -> None:
+    """Find what holds the lengths: it leaves no torque on the held sums."""
     closing = N_BORDER * N_BORDER * stage
     for m in range(N_BORDER):
         clear_number_SUFFIX(w, GAPS + m)
@@ -117,6 +116,21 @@ def free_torques_SUFFIX(w: Array, stage: int) -> None:
         row = N_BORDER - 1 - k
         for j in range(row + 1, N_BORDER):
             reduce_closing_SUFFIX(w, row, closing + N_BORDER * j + row, j)
+
+
+def find_pulls_SUFFIX(w: Array) -> None:
+    """Find the tensions of the actuators from the multipliers."""
+    for m in range(N_LENGTHS):
+        clear_number_SUFFIX(w, PULLED + m)
+    for m in range(N_BORDER):
+        for k in range(HELD_FIRST[m], HELD_FIRST[m + 1]):
+            add_held_SUFFIX(w, PULLED + HELD_PLACE[k], GAPS + m, k)
+
+
+def free_torques_SUFFIX(w: Array, stage: int) -> None:
+    """Take what holds the lengths from the torques out of balance, and add those of the dampers."""
+    arms = ARMS + N_BORDER * N_STRAINS * stage
+    find_multipliers_SUFFIX(w, stage)
     for m in range(N_BORDER):
         for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
             take_product_SUFFIX(w, TORQUES + N_STAGES * i + stage, arms + N_STRAINS * m + i, GAPS + m)
@@ -158,6 +172,7 @@ def length_tables(plan: MotionPlan, routes: MotionRoutes) -> dict[str, object]:
     tables |= {name.upper(): getattr(routes, name) for name in names}
     return tables | {
         "ROW_OF_MUSCLE": tuple(routes.stretched.index(one) for one in range(len(chain.actuators))),
+        "PULLED": routes.routes.pulled,
         "LENGTH_REST": tuple(chain.muscle_paths.rest.tolist()),
         "LENGTH_SLOPES": routes.slopes,
         "TORQUES": routes.torques,

@@ -13,7 +13,7 @@ from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.run.batches import fail, gravity_vector
 from softrobots.compiled.run.compiled_statics import NO_FORCE, CompiledStatics
-from softrobots.compiled.run.friction_states import with_sliders
+from softrobots.compiled.run.friction_states import apart, with_sliders
 from softrobots.compiled.run.motion_batch import MotionBatch
 from softrobots.compiled.run.motion_cases import MotionCases
 from softrobots.compiled.run.motion_course import Course, SpringKicks
@@ -102,8 +102,9 @@ class CompiledDynamics(CompiledStatics):
         }
         first = course.first_state(self._model, start)
         (u, y), (du, dy) = ((one[: self._motors], one[self._motors :][self._moving]) for one in (first.x, first.rates))
-        if first.memory is not None:
-            given.append((run.layout.sliders, self._spring_kicks.carried(first.memory.bending, u, y, du, dy)))
+        if first.memory is not None and (friction := self._model.structure.friction) is not None:
+            bending, anchors = first.memory.bending, friction.anchors(first.memory)
+            given.append((run.layout.anchors, self._spring_kicks.carried(bending, anchors, u, y, du, dy)))
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
         def take(grid: FloatArray) -> StepsTaken:
@@ -170,7 +171,7 @@ class CompiledDynamics(CompiledStatics):
             ParameterError: If an argument has the wrong shape, is not finite or out of range, or its actuators are refused.
             NotConverged: If the step fails, even in small parts; `best` is None.
         """
-        check_frictionless(self._model, "single steps (simulate and C code take that of segments)")
+        check_frictionless(self._model, "single steps (simulate and C code take it)")
         scheme = order_of_steps(order, time_step, self._model, np.ndim(q_motors) < 2)
         run, given, _ = self._motion_code(gravity, damping_time, mass_damping, scheme)
         layout, n, moving = run.layout, self._model.n_springs, self._moving
@@ -254,7 +255,7 @@ class CompiledDynamics(CompiledStatics):
         cases.kick(spring_kicks, 0.0, slice(None), springs, rates)
         values = [(run.layout.position, springs), (run.layout.velocity, rates), *((place, one[None]) for place, one in given)]
         if run.layout.rubbing:
-            values.insert(2, (run.layout.sliders, cases.carried(spring_kicks, springs, rates)))
+            values.insert(2, (run.layout.anchors, cases.carried(spring_kicks, springs, rates)))
         times = rows if h is not None else np.union1d(rows, np.linspace(0.0, end, _COMPARED))
 
         def take(grid: FloatArray) -> StepsTaken:
@@ -269,8 +270,9 @@ class CompiledDynamics(CompiledStatics):
         fail(taken.status, cases.bad, [], [found])
         tips, asked = np.ascontiguousarray(found[..., -3:]), None if h is not None else largest
         springs, rates = self._elastic_state(found[..., :-3])
-        bending = None if taken.sliders is None else self._actuation.bending(np.nan_to_num(taken.sliders))
-        facts = taken.status, taken.grid, taken.errors, asked, taken.interrupted, bending
+        slip, sliders = apart(self._actuation, taken.sliders)
+        bending = None if sliders is None else self._actuation.bending(sliders)
+        facts = taken.status, taken.grid, taken.errors, asked, taken.interrupted, bending, slip
         batch = MotionBatch(rows, springs, rates, tips, *facts)
         check_batch(batch, taken, cases.failures)
         return batch

@@ -88,11 +88,17 @@ def remembered(actuation: Actuation, before: StatesBefore) -> SoftModel:
     return remembering(actuation.model, FrictionMemory(bending, before.anchors[0], pieces))
 
 
+def apart(actuation: Actuation, sliders: FloatArray | None) -> list[Any]:
+    """Return anchors of guides, shape (n, n_guides), and sliders of segments, (n, n_unknowns), that a run ends with."""
+    return [None, None] if sliders is None else np.split(np.nan_to_num(sliders), [actuation.n_guides], axis=1)
+
+
 def with_sliders(actuation: Actuation, sliders: FloatArray | None) -> SoftModel:
-    """Return the robot of the general solver with sliders of segments, shape (1, n_unknowns); as it is without friction."""
+    """Return the robot of the general solver with what a run ends with, of one case; as it is without friction."""
     if sliders is None:
         return actuation.model
-    return remembered(actuation, StatesBefore(sliders, sliders, np.zeros((1, 0)), None))
+    anchors, own = apart(actuation, sliders)
+    return remembered(actuation, StatesBefore(own, own, anchors, None))
 
 
 def gripping(model: SoftModel, layout: Any, w: Any) -> SoftModel:

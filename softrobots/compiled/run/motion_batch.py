@@ -58,6 +58,8 @@ class MotionBatch(CaseResults):
     """Whether Ctrl-C ended the run: cases that were not at their end are `Status.UNSETTLED`, with zeros for what is missing."""
     friction_bending: FloatArray | None = None
     """Bending that dry friction remembers at the end, shape (n, n_sections, 2) [rad]; None without it."""
+    friction_slip: FloatArray | None = None
+    """Length of actuators beyond each guide at its slider, from rest, shape (n, n_guides) [m]; None without dry friction."""
 
 
 _AXES = {"tip_positions": ("tip", "m"), "tip_position": ("tip", "m"), "forces": ("force", "N")}
@@ -104,9 +106,10 @@ def _unpack(fields: Mapping[str, Any]) -> MotionBatch:
     if rows["q_springs"].shape != rows["velocities"].shape:
         raise FileFormatError("its velocities have another shape than its coordinates")
     error = finite_array("tip_error", fields["tip_error"], (len(status),), "m") if "tip_error" in fields else None
-    bending = None
+    bending, slip = None, None
     if "friction_bending" in fields:
         bending = finite_array("friction_bending", fields["friction_bending"], (len(status), None, 2), "rad")
+        slip = finite_array("friction_slip", fields.get("friction_slip", np.zeros((len(status), 0))), (len(status), None), "m")
     return MotionBatch(
         time=time,
         **rows,
@@ -117,6 +120,7 @@ def _unpack(fields: Mapping[str, Any]) -> MotionBatch:
         tolerance=finite_number("tolerance", fields["tolerance"], "m") if "tolerance" in fields else None,
         interrupted=bool(fields["interrupted"]),
         friction_bending=bending,
+        friction_slip=slip,
     )
 
 

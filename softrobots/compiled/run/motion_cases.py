@@ -32,11 +32,13 @@ class MotionCases:
             ParameterError: If a shape differs, the numbers of cases differ, or a path or a table is wrong.
         """
         held, bending = starts if isinstance(starts, Equilibrium) else None, actuation.rest_bending
+        anchors: Any = np.zeros(actuation.n_guides)
         if isinstance(starts, EquilibriumBatch | MotionBatch) and starts.friction_bending is not None:
-            bending = starts.friction_bending
+            bending, anchors = starts.friction_bending, starts.friction_slip
         if held is not None:
-            if model.structure.friction is not None:
-                bending = memory_of(after_step(held.model, held.q_motors, held.q_springs)).bending
+            if (friction := model.structure.friction) is not None:
+                memory = memory_of(after_step(held.model, held.q_motors, held.q_springs))
+                bending, anchors = memory.bending, friction.anchors(memory)
             starts = held.q_springs
         if isinstance(starts, MotionBatch):
             starts = starts.q_springs[:, -1], starts.velocities[:, -1]
@@ -52,32 +54,33 @@ class MotionCases:
             "starts": (model.rest if springs is None else springs, model.n_springs),
             "velocities": (np.zeros(model.n_springs) if rates is None else rates, model.n_springs),
             "friction_bending": (np.reshape(bending, (*np.shape(bending)[:-2], -1)), actuation.rest_bending.size),
+            "friction_slip": (anchors, actuation.n_guides),
         }
         for name, moving in (("q_motors", self._paths), ("forces", self._loads)):
             if len(moving) > 1:
                 arrays[name] = np.tile(arrays[name][0], (len(moving), 1)), arrays[name][1]
-        motors, pushes, springs, rates, bending = batch_rows(**arrays)
+        motors, pushes, springs, rates, bending, anchors = batch_rows(**arrays)
         if held is not None:
             check_start(model, held, np.array([path(0.0) for path in self._paths]) if self._paths else motors)
         self.count = len(motors)
         """Number of cases."""
-        self.bad = unusable(motors, pushes, springs, rates, bending) | actuation.unsuited(motors)
+        self.bad = unusable(motors, pushes, springs, rates, bending, anchors) | actuation.unsuited(motors)
         """Mask of the cases with numbers that cannot be computed with, shape (n,)."""
         self.failures: dict[int, tuple[float, Exception]] = {}
         """Time [s] before which a function of a case has failed, and its error, by case."""
         self._motors, self._forces = without(motors, self.bad, model.relaxed_motors), without(pushes, self.bad)
-        self._bending = without(bending, self.bad)
+        self._bending, self._anchors = without(bending, self.bad), without(anchors, self.bad)
         self.state = without_dust(without(springs, self.bad, model.rest)), without_dust(without(rates, self.bad))
         """Elastic coordinates and rates at the start, each shape (n, n_springs)."""
 
     def carried(self, kicks: SpringKicks, unknowns: FloatArray, rates: FloatArray) -> FloatArray:
-        """Return what code of robots with dry friction carries, shape (n, 3 N), from unknowns and rates after a first kick."""
+        """Return what code with dry friction carries, shape (n, G + 3 N), from unknowns and rates after a first kick."""
         bending, carried = self._bending.reshape(self.count, -1, 2), []
         for case in range(self.count):
             path = self._paths[min(case, len(self._paths) - 1)] if self._paths else None
             motors = self._motors[case] if path is None else path(0.0)
             speeds = 0.0 * motors if path is None else path.kicks.get(0.0, 0.0 * motors)
-            carried.append(kicks.carried(bending[case], motors, unknowns[case], speeds, rates[case]))
+            carried.append(kicks.carried(bending[case], self._anchors[case], motors, unknowns[case], speeds, rates[case]))
         return np.array(carried)
 
     @property
@@ -106,8 +109,8 @@ class MotionCases:
                 motors, jump = path(time), kicks.at(path(time), unknowns[place], changes[0])
                 rates[place] += jump
                 if carried is not None:
-                    begin = 2 * carried.shape[1] // 3
-                    carried[place, begin:] += kicks.strain_rates(motors, unknowns[place], changes[0], jump)
+                    speeds = kicks.strain_rates(motors, unknowns[place], changes[0], jump)
+                    carried[place, -len(speeds) :] += speeds
 
     def motors(self, grid: FloatArray, rows: slice) -> FloatArray:
         """Return the motors of some cases, shape (n or 1, 2 n_steps + 1 or 1, n_motors); see `motors_of_steps`."""

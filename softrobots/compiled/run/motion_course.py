@@ -74,10 +74,13 @@ class SpringKicks:
         mass = self._of_robot.mass_matrix(x)
         return np.asarray(-np.linalg.solve(mass[np.ix_(free, free)], mass[free, : len(change)] @ change))
 
-    def carried(self, bending: FloatArray, motors: FloatArray, unknowns: FloatArray, *rates: FloatArray) -> FloatArray:
-        """Return what code with dry friction carries, sliders, strains and rates (3 N), from the bending that it remembers."""
+    def carried(
+        self, bending: FloatArray, anchors: FloatArray, motors: FloatArray, unknowns: FloatArray, *rates: FloatArray
+    ) -> FloatArray:
+        """Return what code with dry friction carries, anchors, sliders, strains and rates (G + 3 N), from what it remembers."""
         strains = self._of_robot.strains(self._all(motors, unknowns, self._model.rest))[self._strains]
-        return np.concatenate([self._actuation.sliders(bending[None])[0], strains, self.strain_rates(motors, unknowns, *rates)])
+        sliders, speeds = self._actuation.sliders(bending[None])[0], self.strain_rates(motors, unknowns, *rates)
+        return np.concatenate([anchors, sliders, strains, speeds])
 
     def strain_rates(self, motors: FloatArray, unknowns: FloatArray, motor_rates: FloatArray, rates: FloatArray) -> FloatArray:
         """Return the rates of the strains, shape (N,), from places and rates of motors and unknowns."""

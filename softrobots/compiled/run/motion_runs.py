@@ -52,7 +52,7 @@ class StepsTaken:
     is_within: bool = True
     """Whether that is within the tolerance; so are fixed steps."""
     sliders: FloatArray | None = None
-    """Where those of dry friction are at the end, of each strain, shape (n, N) [rad]; None without."""
+    """Where those of dry friction are at the end, of guides and of each strain, (n, G + N) [m, rad]; None without."""
     failure: tuple[float, Exception] | None = None
     """Time [s] before which a function of the one case failed, and its error."""
 
@@ -155,7 +155,7 @@ def take_one(
                     run.put(w, layout.rate_begin, at + kicks.strain_rates(motors, y, change, jump))
     except KeyboardInterrupt:
         interrupted = True
-    sliders = np.array([w[layout.sliders : layout.strain_begin]]) if layout.rubbing else None
+    sliders = np.array([w[layout.anchors : layout.strain_begin]]) if layout.rubbing else None
     whole = np.array([status if failure is None else Status.NOT_A_NUMBER])
     return StepsTaken(grid, rows, whole, interrupted, sliders=sliders, failure=failure)
 
@@ -187,7 +187,7 @@ def take_batch(
     `given` has positions, velocities, of dry friction sliders, strains and rates, and what is the same for all cases.
     """
     layout, bound = run.layout, _bound(run, grid, compared)
-    n, strains = layout.unknowns, layout.strain_begin - layout.sliders
+    n, strains = layout.unknowns, layout.strain_begin - layout.anchors
     given = [*given, *((place, one[None]) for place, one in bound)]
     out, sliders = np.full((cases.count, len(times), 2 * n + 3), np.nan), np.zeros((cases.count, strains))
     statuses = np.full(cases.count, Status.UNSETTLED, dtype=np.uint8)  # until a case is at its end
