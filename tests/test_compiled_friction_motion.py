@@ -12,7 +12,7 @@ import pytest
 import softrobots as sr
 from softrobots.compiled.run.compiled_model import CompiledModel
 from tests.support.c_libraries import Controller
-from tests.support.friction_bars import STICK, STIFFNESS, arm, bar, bent, period, released, smooth
+from tests.support.friction_bars import STICK, STIFFNESS, bar, bent, period, released, smooth
 
 SAME = 1e-9  # relative: Newton's method of both engines ends at 1e-13 in a step, and friction halves what is left at each turn
 
@@ -90,25 +90,6 @@ def test_motion_is_that_of_the_general_solver(name: str) -> None:
     options["forces"] = [options.pop("force"), (0.0, 0.0, 0.0)]
     batch = fast.simulations(0.04, driven, **options)
     np.testing.assert_allclose(batch.q_springs[0], found.q_springs, rtol=0, atol=1e-12)
-
-
-@pytest.mark.study
-def test_slow_motion_is_a_path_of_equilibria() -> None:
-    """A tendon is pulled and let go within 2.4 s, where vibrations last 0.1 s: `solve_equilibrium` from state to state."""
-    model = arm("tension", guide_friction=0.4, bending_friction=1e-3)
-
-    def pull(time: float) -> np.ndarray:
-        return np.array([3.0 * smooth(time) - 2.0 * smooth(time - 1.2)])
-
-    motion = compiled(model).simulate(2.4, pull, time_step=0.02, output_step=1.2, damping_time=0.05)
-    found = None
-    states = [found := sr.solve_equilibrium(model, pull(time), previous=found) for time in np.linspace(0.3, 2.4, 8)]
-    for row, state in ((1, states[3]), (2, states[-1])):
-        assert motion.q_springs[row] == pytest.approx(state.q_springs, abs=0.5 * STICK)
-    loose = sr.solve_equilibrium(arm("tension"), pull(2.4))
-    assert np.abs(states[-1].q_springs - loose.q_springs).max() > 100.0 * STICK  # friction is felt
-    assert np.abs(motion.energy.balance).max() < 1e-6 * motion.energy.motor_work.max()  # of torques and energies by Pinocchio
-    assert np.diff(motion.energy.dissipated).min() > 0.0
 
 
 @pytest.mark.study

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -11,7 +12,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import softrobots as sr
-from tests.support.friction_bars import EI, LENGTH, STICK, STIFFNESS, bar, bent, period, released, smooth
+from tests.support.friction_bars import STICK, STIFFNESS, arm, bar, bent, period, released, smooth
 
 
 def test_the_swings_of_an_oscillator_fall_by_the_same_each_time_until_it_sticks() -> None:
@@ -70,29 +71,17 @@ def test_friction_opposes_the_motion_whatever_its_direction() -> None:
     assert np.linalg.norm(fine) < 0.02 * 0.1  # without friction it would be 0.025 rad elsewhere
 
 
-def arm(kind: str, **fields: Any) -> sr.SoftModel:
-    return sr.load_model(
-        sr.TendonArm(
-            segment_lengths=(LENGTH,),
-            tendon_azimuths=(0.0,),
-            tendon_distance=0.0045,
-            bending_stiffness=EI,
-            elastic_sections=2,
-            kind=kind,
-            **fields,
-        )
-    )
-
-
 @pytest.mark.study
-def test_slow_motion_is_a_path_of_equilibria() -> None:
+@pytest.mark.parametrize("compiled", [False, True])
+def test_slow_motion_is_a_path_of_equilibria(compiled: bool) -> None:
     """A tendon is pulled and let go within 2.4 s, where vibrations last 0.1 s: `solve_equilibrium` from state to state."""
     model = arm("tension", guide_friction=0.4, bending_friction=1e-3)
 
     def pull(time: float) -> np.ndarray:
         return np.array([3.0 * smooth(time) - 2.0 * smooth(time - 1.2)])
 
-    motion = sr.simulate(model, 2.4, pull, time_step=0.02, output_step=1.2, damping_time=0.05)
+    simulate = sr.compile(model, backend="python").simulate if compiled else partial(sr.simulate, model)
+    motion = simulate(2.4, pull, time_step=0.02, output_step=1.2, damping_time=0.05)
     found = None
     states = [found := sr.solve_equilibrium(model, pull(time), previous=found) for time in np.linspace(0.3, 2.4, 8)]
     for row, state in ((1, states[3]), (2, states[-1])):

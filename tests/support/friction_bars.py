@@ -40,6 +40,20 @@ def period() -> float:
     return 1.0 / float(sr.vibration_modes(free, sr.solve_equilibrium(free, [])).frequencies[1])
 
 
+def arm(kind: str, **fields: Any) -> sr.SoftModel:
+    return sr.load_model(
+        sr.TendonArm(
+            segment_lengths=(LENGTH,),
+            tendon_azimuths=(0.0,),
+            tendon_distance=0.0045,
+            bending_stiffness=EI,
+            elastic_sections=2,
+            kind=kind,
+            **fields,
+        )
+    )
+
+
 def released(**fields: Any) -> tuple[sr.SoftModel, sr.Equilibrium]:
     """An arm of two segments whose elastic tendons hold it bent, under a force."""
     model = sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.05), elastic_sections=1, **fields))
