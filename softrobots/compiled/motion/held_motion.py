@@ -27,8 +27,8 @@ _ZERO = 1e-14  # entries that are rounding, relative to the largest of their row
 
 def in_motion(unknowns: Unknowns) -> Unknowns:
     """Return a chain as motion takes it: with given lengths or friction of guides, which steps add, all of them are routes."""
-    chain = unknowns.chain
-    return replace(unknowns, chain=replace(chain, guides=None), as_routes=bool(chain.constrained or chain.guides))
+    chain, rubs = unknowns.chain, unknowns.chain.guides is not None
+    return replace(unknowns, chain=replace(chain, guides=None) if rubs else chain, as_routes=rubs or bool(chain.constrained))
 
 
 def moving_coordinates(unknowns: Unknowns) -> tuple[int, ...]:
