@@ -129,6 +129,42 @@ def test_what_sticks_is_a_pin(arm: sr.SoftModel) -> None:
     assert path.tip_error.max() < 1e-9
 
 
+@pytest.mark.study
+def test_a_segment_with_dry_friction_is_dragged_over_a_ball_and_back() -> None:
+    """Work of the muscles becomes elastic energy, work of the contact, and the moment of dry friction times the way of bending.
+
+    Without friction of the contact the motors are those of the path that needs none of its memory. Motors found drive the robot
+    along the same way by themselves: trials of the search leave no memory.
+    """
+    moment, length, mu = 0.5, 0.3, 0.3
+    model = sr.load_model(sr.PccArm(segment_lengths=(length,), bending_friction=moment, elastic_sections=2))
+    ball = sr.Environment([sr.Sphere(0.05, (0.095, 0.0, 0.16))])
+    lean = sr.solve_equilibrium(model, (0.28, 0.31, 0.31), environment=ball)
+    ways = np.concatenate([np.linspace(0.0, 0.01, 5), np.linspace(0.01, 0.0, 5)[1:]])
+    targets = lean.tip_position + ways[:, None] * (0.5, 0.0, -1.0)
+    smooth, little, path = (
+        sr.follow_trajectory(model, targets, environment=ball, friction=one, q_motors0=lean.q_motors) for one in (0.0, 1e-9, mu)
+    )
+    assert little.q_motors == pytest.approx(smooth.q_motors, abs=1e-7)  # the balance of a step is good to 1e-10 of the load
+    worked = path.contact_path
+    assert worked is not None
+    bodies = [model.structure.section_coordinates(found.q_motors, found.q_springs) for found in path.equilibria]
+    stiffness = 2 / length * np.array([1.92, 1.92, 1.28, 2400.0])
+    stored = 0.5 * np.sum(np.array(bodies) ** 2 * stiffness, axis=(1, 2))
+    rubbed = moment * np.abs(np.diff(np.array(bodies)[:, :, 1], axis=0)).sum(axis=1)
+    pulls = 0.5 * (path.motor_torques[1:] + path.motor_torques[:-1])
+    given = -np.sum(pulls * np.diff(path.q_motors, axis=0), axis=1)
+    for first, last in ((1, 4), (6, 8)):  # where the contact slips
+        assert {one.status for row in path.equilibria[first : last + 1] for one in row.contacts} == {"slips"}
+        taken = worked.dissipation[last] - worked.dissipation[first] + rubbed[first:last].sum()
+        assert taken > 0.1 * abs(given[first:last].sum())
+        # the rule of the trapezoid between rows: a fourth in four times as many, half of it with half the steps
+        assert given[first:last].sum() == pytest.approx(stored[last] - stored[first] + taken, rel=1e-3)
+    assert np.abs(path.q_motors[3] - path.q_motors[5]).max() > 1e-4  # the same tip, forth and back
+    driven = sr.follow_contact(model, path.q_motors, environment=ball, friction=mu, start=path.equilibria[0])
+    assert driven.tip_positions == pytest.approx(path.tip_positions, abs=1e-6)  # what slips turns a little with the steps
+
+
 @pytest.mark.parametrize(("thick", "rows"), [(0.02, 2), (0.02, 3), (0.2, 2)])
 def test_a_tip_stops_before_a_plate_in_any_number_of_rows(thick: float, rows: int) -> None:
     """A ball on a spring that nothing else touches: from 0 to 1 m there is a plate in the middle.
@@ -155,6 +191,12 @@ def test_without_friction_no_tip_passes_through_a_plate_between_waypoints(rows: 
     for environment, jumps in ((plate, True), (low, False)):
         found = sr.follow_trajectory(block(), targets, environment=environment, allow_jumps=jumps)
         assert found.q_motors == pytest.approx(free.q_motors, abs=1e-9)
+
+
+def test_friction_of_guides_is_refused_beside_that_of_contacts() -> None:
+    model = sr.load_model(sr.PccArm(guide_friction=0.1))
+    with pytest.raises(sr.ParameterError, match="without dry friction, for paths in contact with friction in guides"):
+        sr.follow_trajectory(model, [(0.0, 0.0, 1.0)], environment=FLOOR, friction=0.1)
 
 
 def test_what_friction_cannot_have_is_refused(arm: sr.SoftModel) -> None:

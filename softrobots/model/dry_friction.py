@@ -168,6 +168,14 @@ class DryFriction:
             return False
         return not np.any(apart > _STILL * BENDING_STICK)
 
+    def first_turn(self, strains: FloatArray, others: FloatArray, memory: FrictionMemory) -> float:
+        """Return the share of the way to other strains, shape (count,), at which a section that slips first turns round."""
+        apart, way = strains[self.places] - memory.bending, (others - strains)[self.places]
+        share = -(apart * way).sum(axis=1) / np.maximum((way**2).sum(axis=1), 1e-300)
+        least, now = (np.linalg.norm(one, axis=1) for one in (apart + share[:, None] * way, apart))
+        turns = (now > _STILL * BENDING_STICK) & (least < BENDING_STICK) & (share > 0.0)
+        return float(share[turns].min(initial=1.0))
+
     @property
     def beyond_at_rest(self) -> FloatArray:
         """Length beyond each guide at rest, beyond that where all strains are zero, shape (n_guides,) [m]."""

@@ -211,7 +211,7 @@ def follow_trajectory(
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range, or the robot has not enough actuators
-            for poses.
+            for poses, or friction in its guides with friction of contacts.
         NameNotFound: If a frame does not exist.
         TargetUnreachable: If a waypoint cannot be reached, or not without a jump; names it, the distance that remains, and the
             wrist if it is near a singular pose there: the path then goes past that pose with a faster and faster wrist, while a
@@ -224,8 +224,8 @@ def follow_trajectory(
     if rubs and (environment is None or allow_jumps or model.actuators.least_tension):
         requirement = "0 without an environment, with allow_jumps=True, and for a robot whose muscles cannot push"
         raise ParameterError("friction", friction, requirement)
-    if rubs:
-        check_frictionless(model, "friction at contacts")
+    if rubs and model.structure.guided:  # friction of guides follows the tensions
+        check_frictionless(model, "paths in contact with friction in guides")
     goals = Goal.path(targets)
     points = np.array([goal.position for goal in goals])
     orientations = None if goals[0].rotation is None else read_only(np.array([goal.rotation for goal in goals]))

@@ -77,6 +77,9 @@ class Step(Protocol):
     def contacts(self, q_springs: FloatArray) -> NearContacts | None:
         """Return the near contacts; None out of the range of a section."""
 
+    def first_turn(self, q_springs: FloatArray, change: FloatArray) -> float:
+        """Return the share of a change of the coordinates up to which no dry friction of the robot's own turns round."""
+
     def mark(self) -> Any:
         """Return a mark of the place asked last."""
 

@@ -51,7 +51,8 @@ def solve_step(
     """Solve a step from elastic coordinates, shape (n,).
 
     First by full Newton steps; where these do not converge, by steps that are halved while they do not lower the norm of all
-    equations: full steps get over changes of contacts more quickly, and halved ones do not go round in circles.
+    equations: full steps get over changes of contacts more quickly, and halved ones do not go round in circles. Either ends
+    where dry friction of the robot's own would turn round: beyond that it sticks at first, and full steps would go to and fro.
 
     Args:
         step: The robot.
@@ -77,7 +78,7 @@ def solve_step(
             if float(np.linalg.norm(change[0])) <= _STILL and _converged(step, here, forced):
                 return here, spent
             scale = np.maximum(step.stiffness, here.tangent.diagonal())
-            share = min(1.0, LARGEST_STEP / max(float(np.linalg.norm(change[0])), 1e-300))
+            share = min(step.first_turn(here[0], change[0]), LARGEST_STEP / max(float(np.linalg.norm(change[0])), 1e-300))
             base, there = step.mark(), None
             for _ in range(halvings):
                 y, normal, friction = (part + share * by for part, by in zip((here[0], *here[2:4]), change, strict=True))

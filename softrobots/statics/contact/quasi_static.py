@@ -52,6 +52,12 @@ class Rest(NamedTuple):
     """Evaluations."""
 
     @property
+    def given(self) -> Given:
+        """What is given, to go on from there: for a robot with dry friction of its own, with what that remembers."""
+        given = self.robot.given
+        return given._replace(model=after_step(given.model, given.q_motors, self.q_springs))
+
+    @property
     def q_motors(self) -> FloatArray:
         """Motor coordinates, shape (n_motors,)."""
         return self.robot.given.q_motors
@@ -197,8 +203,7 @@ def change(model: SoftModel, there: FloatArray, here: FloatArray) -> float:
 
 def remembering_rest(given: Given, last: Rest) -> Given:
     """Return what is given, for a robot with dry friction of its own with what that remembers of a rest."""
-    model = after_step(last.robot.model, last.robot.given.q_motors, last.q_springs)
-    return given if given.model.structure.friction is None else given._replace(model=model)
+    return given if given.model.structure.friction is None else given._replace(model=last.given.model)
 
 
 def carried_over(given: Given, last: Rest) -> tuple[Sliding, FloatArray]:

@@ -18,6 +18,7 @@ from softrobots.core.vectors import axes_along
 from softrobots.environment.gaps import Gaps
 from softrobots.environment.turning import turning
 from softrobots.model.coordinates import Point
+from softrobots.model.friction_coordinates import memory_of
 from softrobots.model.joint_loads import JointLoad
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.contact.certificate import null_space
@@ -86,6 +87,17 @@ class SlidingRobot:
     def at(self) -> _Place:
         """The place asked last; there must have been one."""
         return self._places[1]  # type: ignore[return-value]
+
+    def first_turn(self, q_springs: FloatArray, change: FloatArray) -> float:
+        """Return the share of a change of the elastic coordinates, shape (n_springs,), at which a slip first turns round.
+
+        That is 1, unless a section with dry friction of its own that slips would stick on the way, and slip back.
+        """
+        friction, model, motors = self.model.structure.friction, self.model, self.given.q_motors
+        if friction is None:
+            return 1.0
+        here, there = (model.structure.strains(motors, y) for y in (q_springs, q_springs + change))
+        return friction.first_turn(here, there, memory_of(model))
 
     def mark(self) -> _Place | None:
         """Return the place asked last."""

@@ -151,16 +151,16 @@ class TargetWay:
         """Time at a place [s]."""
         return float(np.interp(place, np.arange(len(self._times)), self._times))
 
-    def given(self, motors: FloatArray) -> Given:
-        """What is given at motors."""
-        return Given(self._model, motors, self._load, self._environment, self._surroundings)
+    def begin(self, first: Equilibrium, friction: float) -> Rest | None:
+        """Return the robot at rest at the first waypoint; None if it is not."""
+        return at_rest(Given(self._model, first.q_motors, self._load, self._environment, self._surroundings), first, friction)
 
     def step(self, place: float, here: Rest, small: bool = True) -> Rest | None:
         """Put the tip to the target of a place; None if no small step of the robot does."""
         number, work, idle, least, nearest = min(int(place), len(self._goals) - 2), 0.0, 0, np.inf, np.inf
         goal = self._goals[number].between(self._goals[number + 1], place - number)
         for _ in range(_MOST_TURNS):
-            tip = RubbingTip(self.given(here.q_motors), here.sliding, goal)
+            tip = RubbingTip(here.given, here.sliding, goal)
             found = tip.solve(here.q_motors, here.q_springs)
             far = 0.0
             if found is not None and not found.arrived(self._tolerance):
@@ -181,7 +181,7 @@ class TargetWay:
             idle = 0 if far < (1.0 - _IDLE) * least or found.error < (1.0 - _IDLE) * nearest else idle + 1
             least, nearest = min(least, far), min(nearest, found.error)
             part = self._model.actuators.go(here.q_motors, min(0.5, 0.5 / far) * turn)
-            turned = step(self.given(part), here)
+            turned = step(here.given._replace(q_motors=part), here)
             if turned is None or idle > _MOST_IDLE or not np.any(part != here.q_motors):
                 return None
             here, work = turned, work + turned.work
@@ -280,7 +280,7 @@ def follow_targets(
         EquilibriumNotFound: If the robot is not at rest at the first one.
     """
     way = TargetWay(model, goals, times, load, tolerance)
-    walk, begin = ContactWalk(way), at_rest(way.given(first.q_motors), first, friction)
+    walk, begin = ContactWalk(way), way.begin(first, friction)
     if begin is None:
         raise EquilibriumNotFound(
             "the robot does not rest at the first waypoint", best=first, residual=first.residual, iterations=first.iterations
