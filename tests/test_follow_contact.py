@@ -12,6 +12,10 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.environment.standing import standing_among
+from softrobots.statics.contact.last_state import Given, Sliding
+from softrobots.statics.contact.quasi_static import settle
+from softrobots.statics.loads import Load
 from tests.support.laws import law
 from tests.support.planar_robots import block, ladder, rail, rope
 
@@ -429,3 +433,25 @@ def test_friction_of_guides_in_contact_is_refused_by_name() -> None:
         sr.ParameterError, match="without dry friction, for paths in contact of robots that grow, or with friction in"
     ):
         sr.follow_contact(model, model.relaxed_motors, environment=sr.Environment([]), friction=0.1)
+
+
+@settings(max_examples=20)
+@given(side=st.floats(-0.9, 0.9), start=st.floats(0.01, 0.5), sign=st.sampled_from([-1.0, 1.0]))
+def test_a_bar_that_sticks_is_found_from_slips_of_either_sign(side: float, start: float, sign: float) -> None:
+    """Under a load that friction holds Newton's steps end at the stick, from which the next one is exact but for curvature.
+
+    Without that end they go to and fro between slips of either sign for ever.
+    """
+    moment = 4e-3
+    bar = sr.TendonArm(
+        segment_lengths=(0.06,), tendon_azimuths=(), bending_stiffness=2e-3, elastic_sections=1, bending_friction=moment
+    )
+    model, nothing = sr.load_model(bar), sr.Environment([])
+    load = Load.of(model, (2.0 * side * moment / 0.06, 0.0, 0.0))  # an arc moves its tip by half the turn times its length
+    given_there = Given(model, np.zeros(0), load, nothing, standing_among(model, nothing))
+    gaps = given_there.surroundings.at(model.embed(model.coordinates.at(np.zeros(0), model.rest).joints), 0.01)
+    rest = settle(given_there, Sliding(0.0, gaps), model.rest + sign * start * np.eye(model.n_springs)[1], patient=False)
+    assert rest is not None
+    stuck = side * moment / (moment / 1e-4 + 2e-3 / 0.06)  # the spring of the stick beside that of the section
+    assert rest.q_springs[1] == pytest.approx(stuck, rel=1e-3)  # a turn of 1e-4 rad moves the tip by its square
+    assert rest.iterations <= 6
