@@ -6,12 +6,18 @@ import copy
 import pickle
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.optimize import minimize
 
 import softrobots as sr
+from softrobots.environment.standing import standing_among
+from softrobots.model.friction_coordinates import grip_of, memory_of
+from softrobots.statics.elastic_state import ElasticProblem
+from softrobots.statics.loads import Load
 
 EI, LENGTH, DISTANCE = 2e-3, 0.06, 0.0045
 MOMENT = 2e-3  # of friction [N m]
@@ -286,3 +292,43 @@ def test_friction_of_given_lengths_that_runs_away_is_no_equilibrium(coefficient:
         sr.solve_equilibrium(model, model.relaxed_motors + bend, (3.0, 2.0, -3.0))
     assert caught.value.residual == np.inf
     assert np.all(np.isfinite(caught.value.best.q_springs))
+
+
+@pytest.mark.study
+def test_both_frictions_in_contact_are_a_minimum_that_scipy_confirms() -> None:
+    """Tendons of given length push an arm along a wall until it gives way sideways: SLSQP finds nothing lower beside the wall.
+
+    Its energy is that of the arm without friction, plus what a step from the last state takes at the friction of the guides,
+    which is that of the tensions found.
+    """
+    fields: dict[str, Any] = {"segment_lengths": (0.06, 0.0625), "kind": "length", "elastic_sections": 2}
+    model = sr.load_model(sr.TendonArm(**fields, bending_friction=3e-4, guide_friction=0.2))
+    smooth = sr.load_model(sr.TendonArm(**fields))
+    wall = sr.Environment([sr.HalfSpace((-1, 0, 0), offset=-0.03)])
+    friction, found = model.structure.friction, None
+    for pull in (5e-4, 1e-3, 1.5e-3):
+        motors = model.relaxed_motors + pull * np.array([-1.0, 0.5, 0.5, -2.0, 1.0, 1.0])
+        found = sr.solve_equilibrium(model, motors, environment=wall, previous=found)
+    assert found is not None
+    assert found.stable
+    assert found.contacts[0].normal_force > 1.0
+    memory, grip = memory_of(found.model), grip_of(found.model)
+    strains = model.structure.strains(motors, found.q_springs)
+    assert friction.grip(strains, found.muscle_forces, memory) == pytest.approx(grip, abs=1e-9)
+    problem, surroundings = ElasticProblem(smooth, motors, Load.of(smooth)), standing_among(smooth, wall)
+    scale = 1.0 / np.sqrt(smooth.stiffness)
+
+    def energy(scaled: np.ndarray) -> float:
+        state = problem.state(scaled * scale)
+        return 100.0 * (state.energy + friction.at(model.structure.strains(motors, scaled * scale), memory, grip)[0])
+
+    def gap(scaled: np.ndarray) -> float:
+        q = smooth.embed(smooth.coordinates.at(motors, scaled * scale).joints)
+        return 100.0 * float(surroundings.at(q, smooth.reach).values.min())
+
+    here = found.q_springs / scale
+    for aside in np.random.default_rng(1).normal(scale=0.02, size=(2, len(here))):
+        options = {"maxiter": 300, "ftol": 1e-13}
+        least = minimize(energy, here + aside, method="SLSQP", constraints={"type": "ineq", "fun": gap}, options=options)
+        # SLSQP keeps gaps to 1e-9 m, at about 1 N, and ends within its differences of 1e-8
+        assert least.fun == pytest.approx(energy(here), abs=1e-6)

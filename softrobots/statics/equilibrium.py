@@ -8,7 +8,7 @@ from typing import Any
 from softrobots.core.checks import FloatArray, choice, finite_array, positive_integer, positive_number, read_only
 from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.environment.environment import Environment
-from softrobots.model.friction_coordinates import after_step, untouched
+from softrobots.model.friction_coordinates import after_step, grip_of, memory_of, remembering, untouched
 from softrobots.model.link_limits import near_largest_moment
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.contact.certificate import active_contacts
@@ -143,8 +143,9 @@ def equilibrium_from_state(
     stable: bool | None = None,
 ) -> Equilibrium:
     """Result of a state; `stable` if it is already known."""
-    if model.structure.friction is not None:
-        model, state = rubbing_state(model, q_motors, state.q_springs, load)
+    if model.structure.friction is not None:  # from the friction of guides that the state has: others may balance it, too
+        settled = remembering(model, memory_of(model), grip_of(state.model))
+        model, state = rubbing_state(settled, q_motors, state.q_springs, load)
     allowed = largest_residual(model, state.scale, tolerance)
     contacts: dict[str, Any] = {}
     if state.touch is not None:
