@@ -195,7 +195,7 @@ def test_without_friction_no_tip_passes_through_a_plate_between_waypoints(rows: 
 
 def test_friction_of_guides_is_refused_beside_that_of_contacts() -> None:
     model = sr.load_model(sr.PccArm(guide_friction=0.1))
-    with pytest.raises(sr.ParameterError, match="without dry friction, for paths in contact with friction in guides"):
+    with pytest.raises(sr.ParameterError, match="without dry friction, for targets in contact with friction in guides"):
         sr.follow_trajectory(model, [(0.0, 0.0, 1.0)], environment=FLOOR, friction=0.1)
 
 

@@ -13,6 +13,7 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.environment.standing import standing_among
+from softrobots.model.friction_coordinates import grip_of, memory_of
 from softrobots.statics.contact.last_state import Given, Sliding
 from softrobots.statics.contact.quasi_static import settle
 from softrobots.statics.loads import Load
@@ -427,12 +428,37 @@ def test_a_bar_with_dry_friction_of_its_own_remembers_both(friction: float) -> N
     assert again.equilibria[-1].q_springs == pytest.approx(path.equilibria[4].q_springs, abs=1e-9)
 
 
-def test_friction_of_guides_in_contact_is_refused_by_name() -> None:
-    model = sr.load_model(sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1, guide_friction=0.1))
-    with pytest.raises(
-        sr.ParameterError, match="without dry friction, for paths in contact of robots that grow, or with friction in"
-    ):
-        sr.follow_contact(model, model.relaxed_motors, environment=sr.Environment([]), friction=0.1)
+@pytest.mark.study
+@pytest.mark.parametrize("friction", [0.0, 0.3])
+def test_an_arm_with_friction_in_guides_leans_on_a_wall_and_comes_back(friction: float) -> None:
+    """The friction of every guide is the capstan's at the tensions found; without that of the wall it is a row of equilibria.
+
+    That of the wall stays within its cone. At the same tensions the wall is pressed more on the way back.
+    """
+    arm = sr.TendonArm(
+        segment_lengths=(0.06, 0.0625), kind="tension", elastic_sections=2, bending_friction=3e-4, guide_friction=0.2
+    )
+    model, wall = sr.load_model(arm), sr.Environment([sr.HalfSpace((-1, 0, 0), offset=-0.03, name="wall")])
+    pulls = np.array([[one, 0.5, 0.5, 0.5 * one, 0.3, 0.3] for one in (1.0, 2.5, 4.0, 2.5)])
+    path = sr.follow_contact(model, pulls, environment=wall, friction=friction)
+    assert not path.jumps
+    for found in path.equilibria:
+        assert found.stable
+        assert found.converged
+        memory = memory_of(found.model)
+        strains = model.structure.strains(found.q_motors, found.q_springs)
+        grip = model.structure.friction.grip(strains, found.muscle_forces, memory)
+        assert grip_of(found.model) == pytest.approx(grip, abs=1e-9)
+        assert all(one.cone_share <= 1.0 + 1e-6 for one in found.contacts)
+    pressed = [sum(one.normal_force for one in found.contacts) for found in path.equilibria]
+    if friction == 0.0:
+        last, ways = path.equilibria[0], np.linspace(0.0, 1.0, 17)[1:, None]
+        for before, after, found in zip(pulls, pulls[1:], path.equilibria[1:], strict=False):
+            for row in before + ways * (after - before):
+                last = sr.solve_equilibrium(model, row, environment=wall, previous=last)
+            # Steps of other lengths: 1e-4 of the reach
+            assert found.tip_position == pytest.approx(last.tip_position, abs=1e-4 * model.reach)
+    assert pressed[3] > pressed[1] > 0.0
 
 
 @settings(max_examples=20)

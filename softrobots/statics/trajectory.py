@@ -224,8 +224,8 @@ def follow_trajectory(
     if rubs and (environment is None or allow_jumps or model.actuators.least_tension):
         requirement = "0 without an environment, with allow_jumps=True, and for a robot whose muscles cannot push"
         raise ParameterError("friction", friction, requirement)
-    if rubs and model.structure.guided:  # friction of guides follows the tensions
-        check_frictionless(model, "paths in contact with friction in guides")
+    if rubs and model.structure.guided:  # whose friction follows the tensions, and so the motors that are sought
+        check_frictionless(model, "targets in contact with friction in guides")
     goals = Goal.path(targets)
     points = np.array([goal.position for goal in goals])
     orientations = None if goals[0].rotation is None else read_only(np.array([goal.rotation for goal in goals]))

@@ -81,8 +81,7 @@ def follow_contact(
 
     Raises:
         ParameterError: If an argument has the wrong shape, is not finite or out of range, rows differ in number, `start` has
-            other motors than the first row or is out of balance there, or the robot has dry friction of its own and grows, or
-            in guides.
+            other motors than the first row or is out of balance there, or the robot has dry friction of its own and grows.
         NameNotFound: If a frame does not exist.
         EquilibriumNotFound: If there is no equilibrium at the first parameter, or the robot comes to no rest; `best` is then
             the path so far.
@@ -139,8 +138,8 @@ class Course:
             raise ParameterError("parameters", None, "given, for a robot that is a function of them")
         first = model if self._grown is None else self._grown(float(given[0]))  # type: ignore[index]
         self._model = untouched(first)
-        if self._grown is not None or first.structure.guided:  # friction of guides follows the tensions
-            check_frictionless(first, "paths in contact of robots that grow, or with friction in guides")
+        if self._grown is not None:
+            check_frictionless(first, "paths in contact of robots that grow")
         rows = first.actuators.in_order(q_motors, "q_motors")
         columns: dict[str, Any] = {"q_motors": (rows, first.n_motors, first.actuators.described)}
         for name, value in loads.items():

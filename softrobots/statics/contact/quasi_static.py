@@ -9,6 +9,7 @@ of friction, until it rests. That motion only lowers the energy, and stops at eq
 
 from __future__ import annotations
 
+import math
 from dataclasses import replace
 from typing import NamedTuple
 
@@ -19,7 +20,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.environment.gaps import Surroundings
 from softrobots.environment.swept import may_pass
-from softrobots.model.friction_coordinates import after_step
+from softrobots.model.friction_coordinates import MOST_ROUNDS, SAME_FRICTION, GuideFriction, after_step
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.contact_laws import Balance
 from softrobots.statics.contact.coulomb import GAP, solve_step
@@ -88,14 +89,26 @@ def settle(
 ) -> Rest | None:
     """Solve one step from elastic coordinates, shape (n_springs,); None if it does not converge to a state that holds.
 
-    For `patient` and `forced` see `coulomb.solve_step`.
+    Friction of guides is found in rounds, with the step anew in each. For `patient` and `forced` see `coulomb.solve_step`.
     """
+    rounds, spent = GuideFriction(), 0
     with one_blas_thread(given.model.n_springs):
-        robot = SlidingRobot(given, last, brake)
-        found, spent = solve_step(robot, start, last.friction, patient=patient, forced=forced)
-        if found is None or not robot.holds(found):
-            return None
-        return Rest(robot, found, robot.work(found), spent)
+        for _ in range(MOST_ROUNDS):  # the friction of guides follows the tensions
+            robot = SlidingRobot(given, last, brake)
+            found, more = solve_step(robot, start, last.friction, patient=patient, forced=forced)
+            spent += more
+            if found is None or not robot.holds(found):
+                return None
+            off = 0.0
+            if given.model.structure.guided:
+                pulls = robot.at.point.reduce(robot.joint_load(found.normal, found.friction)).motors
+                model, off = rounds.after(given.model, given.q_motors, found.q_springs, pulls)
+                given, start = given._replace(model=model), start if brake else found.q_springs  # a brake counts from the start
+            if off <= SAME_FRICTION:
+                return Rest(robot, found, robot.work(found), spent)
+            if math.isinf(off):
+                return None
+        return None
 
 
 def at_rest(given: Given, start: Equilibrium, friction: float) -> Rest | None:
