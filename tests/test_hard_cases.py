@@ -279,7 +279,8 @@ def test_compiled_code_that_hangs_ends_the_soak_with_a_broken_law(monkeypatch: p
 def test_every_loop_of_the_compiled_solvers_ends() -> None:
     """A loop without a count goes on with a share that it halves or doubles, up to a limit that the share itself has.
 
-    Those of motion advance by a part of the step, which is halved down to a limit, or by a row of the result.
+    Those of motion advance by a part of the step, which is halved down to a limit, or by a row of the result; those of friction
+    have a number of evaluations.
     """
     loops = []
     for file in (CHECKOUT / "softrobots" / "compiled").rglob("*drivers.py"):
@@ -294,6 +295,7 @@ def test_every_loop_of_the_compiled_solvers_ends() -> None:
         "share > 1e-12 * largest": "share *= 0.5",
         "2.0 * share * length < longest": "share *= 2.0",
         "done < 1.0": "part *= 0.5",
+        "left > 0.0": "left -= 1.0",
         "times[row] <= grid[step + 1] or step == n_steps - 1": "row += 1",
         "times[row] <= grid[step + 1] or step == len(grid) - 2": "row += 1",
     }

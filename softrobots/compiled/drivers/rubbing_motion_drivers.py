@@ -41,7 +41,7 @@ def search_back(w: Array, first: float, left: float) -> float:
     slope = downhill(w)
     if first <= 0.0 or slope >= -OVERSHOT * first:
         return left
-    while left > 0.0 and fabs(slope) > 0.5 * first:
+    while fabs(slope) > 0.5 * first and left > 0.0:
         if slope > 0.0:
             if last > 0.0:
                 rise *= 0.5
