@@ -230,8 +230,8 @@ class Predictor:
         if lost:
             words = ", ".join(lost[:10]) + (f" and {len(lost) - 10} more" if len(lost) > 10 else "") + " have none"
             requirement = f"rows with an equilibrium at the values to start from; {words}: start from others, or leave them out"
-            asked = "are order, signs and units of actuators and loads right?"
-            raise ParameterError("measurements", measurements, f"{requirement} by the mask; {asked}")
+            requirement += " by the mask; are order, signs and units of actuators and loads right?"
+            raise ParameterError("measurements", measurements, requirement)
         self._springs = states.q_springs
         return states, np.array(sliders) if self.in_order else None
 

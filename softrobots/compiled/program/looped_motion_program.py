@@ -74,10 +74,8 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     ]
     held = routes is not None and routes.held
     if layout.rubbing:
-        tables |= {"STRAIN_CORRECTION": plan.correction, "TORQUES": plan.torques[0]}
-        tables |= dict(
-            zip(("STRAINS_AT", "RATES_AT"), plan.strains if held else (layout.position, layout.velocity), strict=False)
-        )
+        strains, rates = plan.strains[:2] if held else (layout.position, layout.velocity)
+        tables |= {"STRAIN_CORRECTION": plan.correction, "TORQUES": plan.torques[0], "STRAINS_AT": strains, "RATES_AT": rates}
     tables |= {"N_STRAINS": n, "N_BENDS": n * places.stages, "N_STAGES": places.stages, "RATES": _rates(plan, places)}
     tables |= {} if actuators is None else actuators.tables
     control = (("" if actuators is None else actuators.after) + control_text(plan, bends)).strip()

@@ -9,7 +9,7 @@ from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.routes.ends import keep_lengths
 from softrobots.compiled.routes.loops import LENGTHS, PULLS, loops_of
-from softrobots.compiled.routes.motion_border import BORDER, BORDER_WITH_GUIDES, border_blocks, factors_text
+from softrobots.compiled.routes.motion_border import border_blocks, border_text, factors_text
 from softrobots.compiled.routes.motion_follow import FOLLOW, SWERVE, arms_text, find_tensions, form_blocks, frame_blocks
 from softrobots.compiled.routes.motion_lengths import LENGTHS as HELD
 from softrobots.compiled.routes.motion_lengths import held_blocks, keep_swerves, length_tables
@@ -107,7 +107,7 @@ def actuator_parts(plan: MotionPlan, routes: MotionRoutes) -> ActuatorParts:
         tables |= length_tables(plan, routes)
         blocks += held_blocks(plan, routes)
         after = factors_text("closing") + HELD
-    after += factors_text("system") + (BORDER if plan.guides is None else BORDER_WITH_GUIDES)
+    after += factors_text("system") + border_text(guides=plan.guides is not None)
     if plan.guides is not None:
         tables |= own.guide_tables(plan.guides) | {"SIDES": routes.sides, "MIDDLE": strain}
     return ActuatorParts([*blocks, *border_blocks(plan, routes)], tables, before, calls, after)

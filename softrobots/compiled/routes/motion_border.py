@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.motion_routes import MotionRoutes
 from softrobots.compiled.trace.blocks import Block
@@ -39,15 +37,12 @@ def solve_{name}_SUFFIX(w: Array, at: int) -> None:
 '''
 
 
-BORDER = '''def factor_border_SUFFIX(w: Array) -> None:
+_BORDER = '''def factor_border_SUFFIX(w: Array) -> None:
     """Solve for the rows of the border, and take their products with the answers."""
     for m in range(N_BORDER):
         for i in range(N_STRAINS):
             take_row_SUFFIX(w, i, N_STRAINS * m + i)
-        start_reduce_SUFFIX(w)
-        reduce_all_SUFFIX(w)
-        correct_all_SUFFIX(w)
-        for i in range(N_STRAINS):
+SOLVE_ROW        for i in range(N_STRAINS):
             keep_answer_SUFFIX(w, i, N_STRAINS * m + i)
     for m in range(N_BORDER):
         for n in range(N_BORDER):
@@ -60,10 +55,7 @@ def correct_strains_SUFFIX(w: Array) -> None:
     """Write the correction with the factors that are there, and with the border."""
     for i in range(N_STRAINS):
         take_torque_SUFFIX(w, i)
-    start_reduce_SUFFIX(w)
-    reduce_all_SUFFIX(w)
-    correct_all_SUFFIX(w)
-    for m in range(N_BORDER):
+SOLVE    for m in range(N_BORDER):
         clear_multiplier_SUFFIX(w, m)
         for i in range(BORDER_FIRST[m], BORDER_LAST[m]):
             add_multiplier_SUFFIX(w, i, m, N_STRAINS * m + i)
@@ -79,11 +71,16 @@ def correct_strains_SUFFIX(w: Array) -> None:
 
 
 '''
-"""Loops over the border; a factor of the stiffness counts where tensions follow the lengths, not where lengths are given."""
 
-_PASSES = r"start_reduce_SUFFIX\(w\)\s+reduce_all_SUFFIX\(w\)\s+correct_all_SUFFIX"
-BORDER_WITH_GUIDES = re.sub(_PASSES, "solve_held", BORDER)
-"""The same with the inverse of `guide_motion_drivers` instead of passes over the chain."""
+
+def border_text(*, guides: bool) -> str:
+    """Return the loops over the border; `guides`: whether some have friction, for which `guide_motion_drivers` keep an inverse.
+
+    A factor of the stiffness counts where tensions follow the lengths, not where lengths are given.
+    """
+    passes = ("solve_held",) if guides else ("start_reduce_SUFFIX", "reduce_all_SUFFIX", "correct_all_SUFFIX")
+    row, whole = ("".join(f"{indent}{one}(w)\n" for one in passes) for indent in (" " * 8, " " * 4))
+    return _BORDER.replace("SOLVE_ROW", row).replace("SOLVE", whole)
 
 
 class _Numbers:

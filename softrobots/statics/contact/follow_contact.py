@@ -136,10 +136,8 @@ class Course:
         given = None if parameters is None else increasing("parameters", finite_array("parameters", parameters, (None,)), "")
         if self._grown is not None and given is None:
             raise ParameterError("parameters", None, "given, for a robot that is a function of them")
-        first = model if self._grown is None else self._grown(float(given[0]))  # type: ignore[index]
+        first = model if self._grown is None else self._grown_to(float(given[0]))  # type: ignore[index]
         self._model = untouched(first)
-        if self._grown is not None:
-            check_frictionless(first, "paths in contact of robots that grow")
         rows = first.actuators.in_order(q_motors, "q_motors")
         columns: dict[str, Any] = {"q_motors": (rows, first.n_motors, first.actuators.described)}
         for name, value in loads.items():
@@ -163,6 +161,10 @@ class Course:
             self._environment.at(parameter)
         self._last: tuple[Any, ...] = (None, None, None)
 
+    def _grown_to(self, parameter: float) -> SoftModel:
+        """Return the robot at a parameter, without dry friction of its own."""
+        return check_frictionless(self._grown(parameter), "paths in contact of robots that grow")  # type: ignore[misc]
+
     def parameter(self, place: float) -> float:
         """Parameter at a place: a number of a row, or between two."""
         return float(np.interp(place, np.arange(len(self.parameters)), self.parameters))
@@ -175,11 +177,7 @@ class Course:
     def at(self, place: float) -> Given:
         """Return what is given at a place."""
         parameter = self.parameter(place)
-        model = (
-            self._model
-            if self._grown is None
-            else check_frictionless(self._grown(parameter), "paths in contact of robots that grow")
-        )
+        model = self._model if self._grown is None else self._grown_to(parameter)
         row = {name: _between(rows, place) for name, rows in self._columns.items()}
         wrench = {key: row[name] for name, key in self._frames.items()} or row.get("wrench")
         load = Load.of(model, row.get("force"), wrench=wrench, frame=self._frame, gravity=row.get("gravity"))
