@@ -213,3 +213,8 @@ def __getattr__(name: str) -> Any:
 
     globals()["compile"] = compile_model
     return compile_model
+
+
+def __dir__() -> list[str]:
+    """What completion offers: public names, with those that are imported when they are asked for."""
+    return [*__all__, "compile", "jax", "torch"]

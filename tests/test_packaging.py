@@ -52,7 +52,8 @@ waypoints with_points with_springs write_interactive
 
 def test_the_public_names_are_these_and_exist() -> None:
     assert sr.__all__ == PUBLIC.split()
-    for name in (*sr.__all__, "compile", "jax", "torch"):
+    assert set(dir(sr)) == {*sr.__all__, "compile", "jax", "torch"}  # what completion offers
+    for name in dir(sr):
         assert getattr(sr, name) is not None
 
 
