@@ -13,10 +13,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+import yaml
 
 import softrobots as sr
 from softrobots.cli import identify as command
 from softrobots.identification.fit import INTERRUPTED
+from softrobots.identification.measurement_columns import read_columns
 from softrobots.robots.parameter_file import read_robot
 from tests.support.tables import each_row
 
@@ -216,3 +218,13 @@ def test_bad_input_is_refused_with_status_2(words: tuple[str, ...], message: str
     status, out, err = told(*WORDS, *words)
     assert (status, out) == (2, "")
     assert message in err
+
+
+def test_a_table_without_a_mapping_shows_its_columns_and_how_a_mapping_looks(folder: Path, told: Told) -> None:
+    words = [word for word in WORDS if word not in ("--columns", "columns.yaml")]
+    status, out, err = told(*words, *FIT)
+    assert (status, out) == (2, "")
+    first_line = Path(words[1]).read_text(encoding="utf-8").splitlines()[0]
+    assert first_line[:100] in err
+    assert "--columns FILE" in err
+    read_columns(yaml.safe_load(err[err.index("{") :]))  # the example that it gives is a mapping

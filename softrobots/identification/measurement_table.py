@@ -160,11 +160,17 @@ def table_of(arguments: Mapping[str, Any]) -> tuple[dict[str, Sequence[Any]], di
     return table, mapping | {"markers": arguments["markers"]}
 
 
+_EXAMPLE = "{actuators: {columns: [q1, q2], unit: deg}, positions: {tip: {columns: [x, y, z], unit: mm}}}"
+
+
 def _own_columns(path: Path) -> Any:
     with opened(path) as file:
         line = file.readline(LARGEST_FILE).decode("utf-8", "replace").removeprefix("\ufeff")
     if not line.startswith(OWN_COLUMNS):
-        raise FileFormatError(f"{path} does not tell its columns, as files of Measurements.to_csv do: a mapping is required")
+        raise FileFormatError(
+            f"{path} does not tell which of its columns are what, as files of Measurements.to_csv do: it begins with "
+            f"{line.strip()[:200]!r}; give a mapping (columns=, or --columns FILE) such as {_EXAMPLE}"
+        )
     try:
         return parse_yaml(line.removeprefix(OWN_COLUMNS))
     except FileFormatError as error:
