@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> Path:
     count = {} if arguments.sections is None else {"elastic_sections": arguments.sections, "hinges": arguments.sections}
     tube = sr.HelixTube.from_design(design, pressure=arguments.pressure, upright=arguments.upright, **count)
     refuse_too_large(tube, "--sections", tube.elastic_sections)
-    pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method, remainder="respace")
+    pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method)
     # Hinges give the right sag with far fewer joints than sections, which are too stiff if the tube turns much along one.
     robots = {"helix_tube": tube, "helix_tube_lumped": dataclasses.replace(tube, chain="lumped")}
     model = sr.load_model(robots["helix_tube_lumped"])
@@ -104,7 +104,7 @@ def run(arguments: argparse.Namespace) -> Path:
             canvas.write_png(figure, folder / "shape.png", overwrite=False)
         step("files")
         sr.save_result(loaded, folder / "equilibrium.npz")
-        design.save(folder / "design.json")
+        sr.save_result(design, folder / "design.json")
         helix.write_template(pattern, folder / "template.svg")
         helix.write_template_pages(pattern, folder / "template_pages" / "page.svg")
         helix.write_template_table(pattern, folder / "template.csv")
@@ -138,7 +138,10 @@ def _design(arguments: argparse.Namespace) -> helix.HelixDesign:
     if arguments.nearest and not required:
         raise sr.ParameterError("--nearest", True, "given with --antenna or --grasp")
     if arguments.design is not None:
-        return helix.HelixDesign.load(arguments.design)
+        design = sr.load_result(arguments.design)
+        if not isinstance(design, helix.HelixDesign):
+            raise sr.ParameterError("--design", str(arguments.design), f"a saved helix design, not a {type(design).__name__}")
+        return design
     if arguments.angle is not None and not 0.0 <= arguments.angle < 90.0:
         raise sr.ParameterError("--angle", arguments.angle, "in [0, 90) degrees")
     default = sr.HelixTube()

@@ -16,22 +16,21 @@ from tests.support.tables import each_row
 UNITS = {
     "m": "length radius wall_thickness position distance hinge_offset probe_distance offset displacement outer_radius "
     "inner_radius diameter outer_arc inner_arc arc arc_length object_radius deflection turn_height squeeze stopper gap spacing "
-    "tape_length front lengths x y z reach positions tolerance",
+    "front lengths x y z reach positions tolerance",
     "m/rad": "pitch",
     "m^3": "inflated_volume tank_volume",
-    "rad": "angle bending azimuth azimuths offsets start_azimuth angle_limits",
+    "rad": "angle bending azimuth azimuths offsets",
     "Pa": "pressure young_modulus shear_modulus tank_pressure ambient_pressure",
     "N": "force axial_force",
     "N m": "moment max_moment slack_moment",
     "N m/rad": "stiffness",
     "s": "times",
-    "-": "contraction poisson_ratio turns s contraction_limits",
+    "-": "contraction poisson_ratio turns s",
     "": "strains share",
 }
 """SI and radians, by the name of the argument; none for rows of several units."""
 UNIT_OF = {name: unit for unit, names in UNITS.items() for name in names.split()}
 OTHER_UNITS = {(call, "s"): "rad" for call in ("points", "tangents", "normals", "binormals", "frames")}
-OTHER_UNITS |= {("bent_tube", "tolerance"): ""}
 """Where a name means something else: the angle about the axis; a share of a length and a rotation at once."""
 TOLD_AS = {("HelixShape", "outer_radius"): "inner_radius"}
 """Where the other of two numbers is named that do not fit each other."""

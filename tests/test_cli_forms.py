@@ -15,7 +15,6 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import helix
 from softrobots.cli import bench
 from softrobots.cli.main import main
 from softrobots.compiled.run.backends import available_backend
@@ -365,7 +364,7 @@ def test_helix_design_of_an_antenna_is_written_and_makes_it(answer, told, tmp_pa
     again = answer("helix", "forward", *("--contraction", repr(found["contraction"])), "--angle", repr(found["angle"]))
     assert again["centre_radius"] == pytest.approx(0.07, rel=1e-12)
     assert again["turn_height"] == pytest.approx(0.18, rel=1e-12)
-    design = helix.HelixDesign.load(files["-o"])
+    design = sr.load_result(files["-o"])
     assert (design.handedness, design.turns) == ("left", 3.0)
     assert design.tube_length == found["length"]
     assert ElementTree.parse(files["--template"]).getroot().get("width", "").endswith("mm")

@@ -10,11 +10,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from scipy.interpolate import PchipInterpolator
-from scipy.optimize import brentq
 
 from softrobots import helix
-from softrobots.core.errors import FileFormatError, OutputExists, ParameterError, StraightTube
+from softrobots.core.errors import FileFormatError, ParameterError, StraightTube
 from softrobots.helix import ActuatorTable
 from tests.support.laws import law
 from tests.support.tables import each_row
@@ -22,12 +20,11 @@ from tests.support.tables import each_row
 PRESSURES = (0.0, 10e3, 25e3, 40e3, 60e3)
 LENGTHENING = (0.50, 0.58, 0.71, 0.80, 0.86)  # an inverse pneumatic muscle; invented numbers
 CONTRACTING = (1.0, 0.93, 0.80, 0.74, 0.70)
-KINDS = [(shares, kind) for shares in (LENGTHENING, CONTRACTING) for kind in helix.INTERPOLATIONS]
 
 
-@pytest.mark.parametrize(("shares", "kind"), KINDS)
-def test_every_row_is_reproduced_and_the_limits_are_its_ends(shares: tuple[float, ...], kind: str) -> None:
-    table = ActuatorTable(PRESSURES, shares, kind)
+@pytest.mark.parametrize("shares", [LENGTHENING, CONTRACTING])
+def test_every_row_is_reproduced_and_the_limits_are_are_its_ends(shares: tuple[float, ...]) -> None:
+    table = ActuatorTable(PRESSURES, shares)
     np.testing.assert_allclose(table.contraction_at(PRESSURES), shares, rtol=0.0, atol=2e-16)
     np.testing.assert_allclose(table.pressure_for(shares), PRESSURES, rtol=1e-13, atol=1e-10)
     assert table.pressure_limits == (0.0, 60e3)
@@ -44,34 +41,23 @@ def test_a_linear_table_lies_on_the_chords(shares: tuple[float, ...]) -> None:
         np.testing.assert_allclose(table.contraction_at(between), expected, rtol=0.0, atol=5e-16)  # a few roundings
 
 
-@pytest.mark.parametrize("shares", [LENGTHENING, CONTRACTING])
-def test_a_cubic_table_is_scipys_and_its_inverse_is_the_root(shares: tuple[float, ...]) -> None:
-    table, cubic = ActuatorTable(PRESSURES, shares, "pchip"), PchipInterpolator(PRESSURES, shares)
-    places = np.linspace(0.0, 60e3, 41)
-    np.testing.assert_allclose(table.contraction_at(places), cubic(places), rtol=1e-14)
-    for wanted in np.linspace(*table.contraction_limits, 17)[1:-1]:
-        root = brentq(lambda p, wanted=wanted: float(cubic(p)) - wanted, 0.0, 60e3, xtol=1e-9)
-        assert table.pressure_for(wanted) == pytest.approx(root, abs=1e-8)  # twice the tolerance of brentq, and rounding
-
-
 @law("helix.ActuatorTable")
 @settings(max_examples=60, deadline=None)
 @given(
     steps=st.lists(st.tuples(st.floats(1e-3, 1e5), st.floats(1e-3, 1.0)), min_size=1, max_size=8),
     falling=st.booleans(),
-    kind=st.sampled_from(helix.INTERPOLATIONS),
     share=st.floats(0.0, 1.0),
 )
-def test_any_table_is_monotone_and_inverted(steps: list[tuple[float, float]], falling: bool, kind: str, share: float) -> None:
+def test_any_table_is_monotone_and_inverted(steps: list[tuple[float, float]], falling: bool, share: float) -> None:
     pressures = np.cumsum([-5e3, *(step[0] for step in steps)])
     levels = np.cumsum([1e-3, *(step[1] for step in steps)])
     levels /= levels[-1]
-    table = ActuatorTable(pressures, levels[::-1] if falling else levels, kind)
+    table = ActuatorTable(pressures, levels[::-1] if falling else levels)
     low, high = table.contraction_limits
     wanted = min(max(low + share * (high - low), low), high)
     found = table.pressure_for(wanted)
-    # The pressure carries a rounding or two; the slope is at most the steepest chord, three times that for the cubic.
-    steepest = 3.0 * float(np.max(np.abs(np.diff(table.contraction) / np.diff(pressures))))
+    # The pressure carries a rounding or two; the slope is at most the steepest chord.
+    steepest = float(np.max(np.abs(np.diff(table.contraction) / np.diff(pressures))))
     assert table.contraction_at(found) == pytest.approx(wanted, abs=4.0 * steepest * np.spacing(1e4 + pressures[-1]) + 1e-15)
     many = table.contraction_at(np.clip(np.linspace(*table.pressure_limits, 200), *table.pressure_limits))
     assert np.all(np.diff(many) <= 1e-15 if falling else np.diff(many) >= -1e-15)
@@ -104,20 +90,11 @@ def test_a_table_is_frozen() -> None:
     with pytest.raises(ValueError, match="read-only"):
         table.contraction[0] = 0.3
     with pytest.raises(FrozenInstanceError):
-        table.interpolation = "pchip"
+        table.contraction = LENGTHENING
     assert pickle.loads(pickle.dumps(table)).contraction_at(10e3) == 0.58
 
 
 # --- Files
-
-
-def test_a_file_is_not_overwritten_unless_told(tmp_path: Path) -> None:
-    path = ActuatorTable(PRESSURES, LENGTHENING).write_csv(tmp_path / "muscle.csv")
-    with pytest.raises(OutputExists):
-        ActuatorTable(PRESSURES, CONTRACTING).write_csv(path)
-    assert ActuatorTable.read_csv(path).contraction.tolist() == list(LENGTHENING)
-    ActuatorTable(PRESSURES, CONTRACTING).write_csv(path, overwrite=True)
-    assert ActuatorTable.read_csv(path).contraction.tolist() == list(CONTRACTING)
 
 
 def test_what_spreadsheets_add_is_read(tmp_path: Path) -> None:
@@ -180,7 +157,6 @@ def test_a_file_that_cannot_be_read_says_so(tmp_path: Path) -> None:
 # --- Bad input
 
 
-@each_row("kind", helix.INTERPOLATIONS)
 @each_row(
     ("method", "value", "field", "named"),
     [
@@ -193,48 +169,42 @@ def test_a_file_that_cannot_be_read_says_so(tmp_path: Path) -> None:
         ("contraction_at", "low", "pressure", "finite"),
     ],
 )
-def test_beyond_the_table_nothing_is_said(kind: str, method: str, value: object, field: str, named: str) -> None:
-    table = ActuatorTable(PRESSURES, LENGTHENING, kind)
+def test_beyond_the_table_nothing_is_said(method: str, value: object, field: str, named: str) -> None:
+    table = ActuatorTable(PRESSURES, LENGTHENING)
     with pytest.raises(ParameterError, match=named) as caught:
         getattr(table, method)(value)
     assert caught.value.field == field
 
 
 @each_row(
-    ("pressure", "contraction", "kind", "field"),
+    ("pressure", "contraction", "field"),
     [
-        ([0.0], [0.5], "linear", "pressure"),
-        ([], [], "linear", "pressure"),
-        (0.0, 0.5, "linear", "pressure"),
-        ([0.0, 1.0, 2.0], [0.5, 0.6], "linear", "contraction"),
-        ([0.0, 1.0], [[0.5, 0.6]], "linear", "contraction"),
-        ([0.0, 0.0], [0.5, 0.6], "linear", "pressure"),
-        ([1.0, 0.0], [0.5, 0.6], "linear", "pressure"),
-        ([0.0, 5e-324], [0.5, 0.6], "pchip", "pressure"),  # its slope would overflow
-        ([0.0, float("nan")], [0.5, 0.6], "linear", "pressure"),
-        ([0.0, 1.0], [0.0, 0.6], "linear", "contraction"),
-        ([0.0, 1.0], [-0.1, 0.6], "linear", "contraction"),
-        ([0.0, 1.0], [0.5, 1.0 + 1e-15], "linear", "contraction"),
-        ([0.0, 1.0], [0.5, float("inf")], "linear", "contraction"),
-        ([0.0, 1.0, 2.0], [0.5, 0.6, 0.6], "linear", "contraction"),
-        ([0.0, 1.0, 2.0], [0.5, 0.6, 0.55], "pchip", "contraction"),
-        ([0.0, 1.0], [0.5, 0.6], "spline", "interpolation"),
-        ([0.0, 1.0], [0.5, 0.6], None, "interpolation"),
+        ([0.0], [0.5], "pressure"),
+        ([], [], "pressure"),
+        (0.0, 0.5, "pressure"),
+        ([0.0, 1.0, 2.0], [0.5, 0.6], "contraction"),
+        ([0.0, 1.0], [[0.5, 0.6]], "contraction"),
+        ([0.0, 0.0], [0.5, 0.6], "pressure"),
+        ([1.0, 0.0], [0.5, 0.6], "pressure"),
+        ([0.0, 5e-324], [0.5, 0.6], "pressure"),  # its slope would overflow
+        ([0.0, float("nan")], [0.5, 0.6], "pressure"),
+        ([0.0, 1.0], [0.0, 0.6], "contraction"),
+        ([0.0, 1.0], [-0.1, 0.6], "contraction"),
+        ([0.0, 1.0], [0.5, 1.0 + 1e-15], "contraction"),
+        ([0.0, 1.0], [0.5, float("inf")], "contraction"),
+        ([0.0, 1.0, 2.0], [0.5, 0.6, 0.6], "contraction"),
+        ([0.0, 1.0, 2.0], [0.5, 0.6, 0.55], "contraction"),
     ],
 )
-def test_bad_tables_are_refused(pressure: object, contraction: object, kind: str, field: str) -> None:
+def test_bad_tables_are_refused(pressure: object, contraction: object, field: str) -> None:
     with pytest.raises(ParameterError) as caught:
-        ActuatorTable(pressure, contraction, kind)
+        ActuatorTable(pressure, contraction)
     assert caught.value.field == field
 
 
-def test_bad_paths_and_interpolations_are_refused(tmp_path: Path) -> None:
+def test_bad_paths_are_refused() -> None:
     with pytest.raises(ParameterError, match="path"):
         ActuatorTable.read_csv(3)
-    with pytest.raises(ParameterError, match="path"):
-        ActuatorTable(PRESSURES, LENGTHENING).write_csv("")
-    with pytest.raises(ParameterError, match="interpolation"):
-        ActuatorTable.read_csv(tmp_path / "none.csv", "cubic")
 
 
 def test_a_straight_tube_has_no_helix() -> None:

@@ -39,8 +39,9 @@ def test_the_table_of_pattern_errors_is_current() -> None:
     assert len(table) == 3
     for spacing, largest, radius, rise in table:
         period = 1e-3 * float(spacing.removesuffix(" mm"))
-        actuator = (0.66, math.radians(5.0), DIAMETER, 1.0)
-        error = helix.shape_error(helix.pinch_pattern(actuator, period, handedness="right", remainder="respace"))
+        turns = float(helix.turns(helix.forward(0.66, math.radians(5.0), DIAMETER), math.radians(5.0), 1.0))
+        design = helix.HelixDesign(0.66, math.radians(5.0), DIAMETER, turns)
+        error = helix.shape_error(helix.pinch_pattern(design, period))
         assert largest == f"{1e3 * error.largest_aligned:.2f} mm"
         assert radius == f"{1e3 * error.centre_radius_error:.3f} mm"
         assert rise == f"{1e3 * error.turn_height_error:.2f} mm"

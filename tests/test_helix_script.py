@@ -51,7 +51,7 @@ def test_an_actuator_becomes_design_template_robots_and_scenes(tmp_path: Path, c
     assert len(list((folder / "template_pages").iterdir())) == 4  # 0.8 m in pages of 0.25 m that share 0.02 m
     assert np.allclose(*unloaded.values(), rtol=0.0, atol=1e-12)
     assert summary["sag_m"] == pytest.approx(np.linalg.norm(saved.tip_position - unloaded["helix_tube"]), rel=1e-9)
-    assert sr.helix.HelixDesign.load(folder / "design.json").tube_length == pytest.approx(0.8, rel=1e-12)
+    assert sr.load_result(folder / "design.json").tube_length == pytest.approx(0.8, rel=1e-12)
     assert ElementTree.parse(folder / "template.svg").getroot().get("width").endswith("mm")  # type: ignore[union-attr]
     for page in ("scene.html", "growth.html"):
         assert "meshcat" in (folder / page).read_text(encoding="utf-8").lower()
@@ -66,7 +66,7 @@ def test_an_antenna_has_the_wanted_radius_rise_and_turns(tmp_path: Path) -> None
     assert summary["height_m"] == pytest.approx(0.27, rel=1e-12)
     # Without load the tip is on a left-handed helix: from (R, 0, 0), a turn and a half clockwise and up.
     assert np.allclose(summary["tip_m"], (-0.07, 0.0, 0.27), rtol=0.0, atol=1e-12)
-    design = sr.helix.HelixDesign.load(folder / "design.json")  # the saved design gives the same tube
+    design = sr.load_result(folder / "design.json")  # the saved design gives the same tube
     tube = sr.HelixTube.from_design(design, elastic_sections=6, hinges=6, upright="axis")
     assert (folder / "helix_tube.urdf").read_text(encoding="utf-8") == tube.urdf()
 

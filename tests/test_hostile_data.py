@@ -28,7 +28,7 @@ import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.core import csv_table, npz_file, result_file
 from softrobots.core.result_file import KINDS
-from softrobots.helix import ActuatorTable, HelixDesign
+from softrobots.helix import ActuatorTable
 from softrobots.robots.parameter_file import LARGEST_FILE, read_parameters
 from softrobots.view.live import input as live_input
 from softrobots.view.live.input import Keys, Lines, WatchedFile
@@ -124,7 +124,7 @@ def loop(path: Path) -> Path:
 
 
 @each_row("place", PLACES)
-@each_row("read", [sr.read_waypoints, sr.load_result, HelixDesign.load, read_parameters, inflated_beam.read_characterisation])
+@each_row("read", [sr.read_waypoints, sr.load_result, read_parameters, inflated_beam.read_characterisation])
 def test_what_is_no_file_is_refused_at_once(read: Callable[[Path], object], place: str, tmp_path: Path) -> None:
     refused(read, PLACES[place](tmp_path), "^cannot read |are read|the most that is read|it names nothing")
 
@@ -224,7 +224,7 @@ def test_no_more_rows_and_characters_than_a_limit(monkeypatch: pytest.MonkeyPatc
 # --- JSON
 
 JSON_READERS: dict[str, tuple[Callable[[Path], object], str]] = {
-    "design": (HelixDesign.load, "a.json"),
+    "design": (sr.load_result, "a.json"),
     "benchmark": (data.read_bench, "a.json"),
     "parameters": (read_parameters, "a.json"),
     "live": (data.read_wanted, "a.txt"),
@@ -768,8 +768,7 @@ DOORWAYS = {
     "inflated_beam.characterisation": ("characterisation CSV",),
     "identification.measurement_table": ("measurements CSV",),
     "identification.measurement_columns": ("columns YAML",),
-    "helix.design": ("design JSON",),
-    "core.result_file": ("results NPZ", "results JSON"),
+    "core.result_file": ("results NPZ", "results JSON", "design JSON"),
     "core.checkpoint": ("checkpoint JSON", "checkpoint NPZ"),
     "studies.benchmark.results": ("benchmark JSON",),
     "environment.world_files": ("environment YAML", "environment JSON", "world URDF", "world MJCF", "world SDF"),

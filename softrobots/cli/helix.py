@@ -14,6 +14,7 @@ from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.reports.answers import Fact, add_json, answer_of, lines_of, print_answer
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.core.files import new_file
+from softrobots.core.result_file import save_result
 from softrobots.core.summary import aligned
 from softrobots.helix.template import write_template
 from softrobots.robots import HelixTube
@@ -158,7 +159,7 @@ def _design(arguments: argparse.Namespace) -> None:
     design = _designed(arguments)
     pattern = None
     if arguments.template is not None:
-        pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method, remainder="respace")
+        pattern = helix.pinch_pattern(design, arguments.spacing, arguments.method)
     actuator = helix.Actuator(*map(np.asarray, (design.contraction, design.angle, design.diameter)))
     facts = _tube_facts(arguments, design.shape, actuator, design.tube_length)
     deviation = design.deviation
@@ -170,7 +171,7 @@ def _design(arguments: argparse.Namespace) -> None:
         ]
     files: list[Path] = []
     if arguments.output is not None:
-        files.append(design.save(arguments.output, overwrite=arguments.overwrite))
+        files.append(save_result(design, arguments.output, overwrite=arguments.overwrite))
     if pattern is not None:
         facts += [
             Fact("pinches", pattern.count, "-", f"pieces on the template ({pattern.method})"),

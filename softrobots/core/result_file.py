@@ -116,7 +116,7 @@ def save_result(result: Any, path: str | Path, *, overwrite: bool = False) -> Pa
     Args:
         result: A characterisation, equilibrium, imposed displacement, load estimate, IK solution, trajectory, contact path,
             motion, batch of compiled motions, vibration modes, linear model, workspace, workspace map, measurements,
-            identification, cross-validation, or the branches that `post_buckling_branches` returns.
+            identification, cross-validation, helix design, or the branches that `post_buckling_branches` returns.
         path: File to write; `.npz` is added if it has no suffix.
         overwrite: Replace an existing file.
 

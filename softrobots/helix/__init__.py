@@ -1,6 +1,6 @@
 """Helical actuation of an inflated tube in closed form; [Blumenschein 2018]. NumPy alone; `bent_tube` needs SciPy too."""
 
-from softrobots.helix.actuators import INTERPOLATIONS, ActuatorTable, contraction_from_stoppers, gap_for
+from softrobots.helix.actuators import ActuatorTable, contraction_from_stoppers
 from softrobots.helix.contact import (
     ON_CONTACT,
     SelfContact,
@@ -24,7 +24,7 @@ from softrobots.helix.paths import (
     transform_base_to_axis,
     turn_angle,
 )
-from softrobots.helix.pattern import METHODS, REMAINDERS, Pattern, SheetPoints, pinch_pattern
+from softrobots.helix.pattern import METHODS, Pattern, SheetPoints, pinch_pattern
 from softrobots.helix.pattern_error import DiscreteCentreLine, ShapeError, discrete_centre_line, shape_error
 from softrobots.helix.shapes import HANDEDNESS, PATHS, Actuator, HelixShape, forward, inverse, measure
 from softrobots.helix.template import write_template, write_template_pages, write_template_table
@@ -33,13 +33,11 @@ from softrobots.helix.varying_actuator import BentTube, bent_tube
 
 __all__ = [
     "HANDEDNESS",
-    "INTERPOLATIONS",
     "METHODS",
     "ON_CONTACT",
     "ON_UNREALISABLE",
     "PAPER_CYLINDER",
     "PATHS",
-    "REMAINDERS",
     "Actuator",
     "ActuatorTable",
     "BentTube",
@@ -70,7 +68,6 @@ __all__ = [
     "discrete_centre_line",
     "forward",
     "frames",
-    "gap_for",
     "grasp_force",
     "height",
     "inverse",

@@ -10,8 +10,6 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -19,7 +17,6 @@ import numpy as np
 from softrobots.core.checks import (
     LARGEST,
     FloatArray,
-    choice,
     common_shape,
     finite_array,
     non_negative_array,
@@ -28,32 +25,26 @@ from softrobots.core.checks import (
 )
 from softrobots.core.csv_table import read_table
 from softrobots.core.errors import FileFormatError, ParameterError
-from softrobots.core.files import as_path, csv_text, write_text
+from softrobots.core.files import as_path
 from softrobots.core.summary import Summarised
 from softrobots.helix.shapes import checked_contraction
 
-INTERPOLATIONS = ("linear", "pchip")
-"""Straight between the rows, or SciPy's monotone cubic, which has a continuous slope."""
-
 _COLUMNS = ("pressure_Pa", "contraction")
-_HALVINGS = 60  # of an interval of the table: past the last digit
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class ActuatorTable(Summarised):
-    """Contraction of an actuator measured at some pressures: interpolated between them, an error outside their range.
+    """Contraction of an actuator measured at some pressures: straight between them, an error outside their range.
 
     Raises:
         ParameterError: If there are fewer than two rows, a number is not finite, the pressures do not increase, a contraction
-            is not in (0, 1], the contractions neither rise throughout nor fall throughout, or there is no such interpolation.
+            is not in (0, 1], the contractions neither rise throughout nor fall throughout.
     """
 
     pressure: FloatArray
     """Gauge pressures, increasing, shape (n,) [Pa]; negative ones are vacuum."""
     contraction: FloatArray
     """Contracted over original length `lambda` at each of them, in (0, 1], strictly rising or falling, shape (n,) [-]."""
-    interpolation: str = "linear"
-    """One of `INTERPOLATIONS`."""
 
     def __post_init__(self) -> None:
         """Check and freeze the columns."""
@@ -70,29 +61,26 @@ class ActuatorTable(Summarised):
             raise ParameterError("contraction", self.contraction, "strictly rising or strictly falling with the pressure")
         object.__setattr__(self, "pressure", read_only(pressures))
         object.__setattr__(self, "contraction", read_only(contractions))
-        if choice("interpolation", self.interpolation, INTERPOLATIONS) == "pchip":
-            _ = self._cubic  # raises at once if SciPy is missing
 
     @classmethod
-    def read_csv(cls, path: str | os.PathLike[str], interpolation: str = "linear") -> ActuatorTable:
+    def read_csv(cls, path: str | os.PathLike[str]) -> ActuatorTable:
         """Read a table from a CSV file whose first line names the columns `pressure_Pa` and `contraction`.
 
         Other columns and empty lines are ignored.
 
         Args:
             path: The file.
-            interpolation: One of `INTERPOLATIONS`; the file does not hold it.
 
         Returns:
             The table.
 
         Raises:
-            ParameterError: If `path` is not a path or the interpolation is unknown.
+            ParameterError: If `path` is not a path.
             FileFormatError: If the file cannot be read, lacks a column or has it twice, has fewer than two rows, or (naming the
                 line) has a cell that is not a finite number, more or fewer cells than the first line, a pressure not above the
                 previous one, or a contraction outside (0, 1] or not monotone.
         """
-        file, kind = as_path("path", path), choice("interpolation", interpolation, INTERPOLATIONS)
+        file = as_path("path", path)
         table = read_table(file, _COLUMNS)
         rows = table.numbers.tolist()
         for place, line in enumerate(table.lines):
@@ -100,27 +88,9 @@ class ActuatorTable(Summarised):
         if len(rows) < 2:
             raise FileFormatError(f"{file} has {len(rows)} rows of numbers; at least two are required")
         try:
-            return cls(table.numbers[:, 0], table.numbers[:, 1], kind)
+            return cls(table.numbers[:, 0], table.numbers[:, 1])
         except ParameterError as error:  # numbers too large or too small, rows too close together
             raise FileFormatError(f"{file}: {error}") from error
-
-    def write_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Write the table as CSV, one line a row, full precision.
-
-        Args:
-            path: File to write.
-            overwrite: Replace an existing file.
-
-        Returns:
-            The path of the file.
-
-        Raises:
-            ParameterError: If `path` is not a path.
-            OutputExists: If the file exists and `overwrite` is false.
-            OutputError: If the file cannot be written.
-        """
-        rows = zip(self.pressure.tolist(), self.contraction.tolist(), strict=True)
-        return write_text(path, csv_text(_COLUMNS, rows), overwrite=overwrite)
 
     @property
     def pressure_limits(self) -> tuple[float, float]:
@@ -145,10 +115,7 @@ class ActuatorTable(Summarised):
             ParameterError: If a pressure is not finite or beyond the limits.
         """
         pressures = _within("pressure", pressure, self.pressure_limits, "Pa")
-        if self.interpolation == "pchip":
-            contractions = self._cubic(pressures)
-        else:
-            contractions = np.interp(pressures, self.pressure, self.contraction)
+        contractions = np.interp(pressures, self.pressure, self.contraction)
         return np.asarray(np.clip(contractions, *self.contraction_limits))  # rounding must not leave the table
 
     def pressure_for(self, contraction: Any) -> FloatArray:
@@ -166,23 +133,7 @@ class ActuatorTable(Summarised):
         contractions = _within("contraction", contraction, self.contraction_limits, "-")
         rising = self.contraction[-1] > self.contraction[0]
         known = (self.pressure, self.contraction) if rising else (self.pressure[::-1], self.contraction[::-1])
-        if self.interpolation == "linear":
-            return np.asarray(np.clip(np.interp(contractions, known[1], known[0]), *self.pressure_limits))
-        cubic = self._cubic
-        above = np.clip(np.searchsorted(known[1], contractions), 1, len(known[1]) - 1)
-        low, high = known[0][above - 1], known[0][above]  # where the contraction is too small, and where it is not
-        for _ in range(_HALVINGS):
-            middle = 0.5 * (low + high)
-            enough = cubic(middle) >= contractions
-            low, high = np.where(enough, low, middle), np.where(enough, middle, high)
-        return np.asarray(high)
-
-    @cached_property
-    def _cubic(self) -> Any:
-        """SciPy's monotone cubic interpolation of the rows."""
-        from scipy.interpolate import PchipInterpolator  # here, because importing it takes longer than all of this package
-
-        return PchipInterpolator(self.pressure, self.contraction)
+        return np.asarray(np.clip(np.interp(contractions, known[1], known[0]), *self.pressure_limits))
 
 
 def contraction_from_stoppers(stopper: Any, gap: Any) -> FloatArray:
@@ -203,24 +154,6 @@ def contraction_from_stoppers(stopper: Any, gap: Any) -> FloatArray:
     stoppers, gaps = positive_array("stopper", stopper, "m"), non_negative_array("gap", gap, "m")
     common_shape("gap", stoppers.shape, gaps.shape)
     return np.asarray(stoppers / (stoppers + gaps))
-
-
-def gap_for(contraction: Any, stopper: Any) -> FloatArray:
-    """Return the gap between stoppers for a contraction: the inverse of `contraction_from_stoppers`.
-
-    Args:
-        contraction: Contracted over original length, in (0, 1] [-].
-        stopper: Length of a stopper, positive [m].
-
-    Returns:
-        Gap, the common shape [m].
-
-    Raises:
-        ParameterError: If an argument is out of range or the shapes do not broadcast.
-    """
-    contractions, stoppers = checked_contraction(contraction), positive_array("stopper", stopper, "m")
-    common_shape("stopper", contractions.shape, stoppers.shape)
-    return np.asarray(stoppers * (1.0 - contractions) / contractions)
 
 
 def _within(name: str, value: Any, limits: tuple[float, float], unit: str) -> FloatArray:

@@ -1,35 +1,23 @@
-"""A helix design: actuator and tube, the resulting helix, its deviation from the requirement, and its JSON file."""
+"""A helix design: actuator and tube, the resulting helix, its deviation from the requirement, and its file."""
 
 from __future__ import annotations
 
-import json
 import math
-import os
+from collections.abc import Mapping
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_number, instance_of, listed, non_negative_number, positive_number
-from softrobots.core.errors import FileFormatError, ParameterError
-from softrobots.core.files import as_path, write_text
-from softrobots.core.json_text import read_json
+from softrobots.core.checks import FloatArray, choice, instance_of, non_negative_number, positive_number
+from softrobots.core.errors import ParameterError
+from softrobots.core.result_file import KINDS, Kind
 from softrobots.core.summary import Part, Summarised
-from softrobots.helix.contact import BoolArray, SelfContact, self_contact
+from softrobots.helix.contact import SelfContact, self_contact
 from softrobots.helix.shapes import HANDEDNESS, HelixShape, forward
 from softrobots.helix.tube import centre_length, length_for_turns
 
-Limits = tuple[float, float]
-"""Smallest and largest value."""
-
-LIMIT_ROUNDING = 1e-9
-"""How far contraction [-] and angle [rad] may pass a limit by rounding."""
-
-_FORMAT = 1
-_SAVED = ("contraction", "angle", "diameter", "turns", "handedness", "contraction_limits", "angle_limits")
-_LARGEST_FILE = 1_000_000  # bytes
-_AGREEMENT = 1e-9  # relative: a saved length or radius against the one computed again
+_SAVED = ("contraction", "angle", "diameter", "turns", "handedness")
 
 
 class Wish(NamedTuple):
@@ -62,7 +50,7 @@ class DesignWarning(UserWarning):
     """A design that cannot be built, returned because of `on_unrealisable="warn"`.
 
     Attributes:
-        design: The `HelixDesign`; see its `faults` and `contact`.
+        design: The `HelixDesign`; see its `contact`.
     """
 
     def __init__(self, message: str, *, design: HelixDesign) -> None:
@@ -92,10 +80,6 @@ class HelixDesign(Summarised):
     """"right" or "left"."""
     wish: Wish | None = None
     """The requirement; None if the actuator was given instead."""
-    contraction_limits: Limits | None = None
-    """Smallest and largest contraction that the actuator can have, or None [-]."""
-    angle_limits: Limits | None = None
-    """Smallest and largest angle that the actuator can have, or None [rad]."""
     shape: HelixShape = field(init=False)
     """The helix."""
     tube_length: float = field(init=False)
@@ -112,8 +96,6 @@ class HelixDesign(Summarised):
             "turns": positive_number("turns", self.turns, "-"),
             "handedness": choice("handedness", self.handedness, HANDEDNESS),
             "wish": _checked_wish(self.wish),
-            "contraction_limits": checked_limits("contraction_limits", self.contraction_limits, "-"),
-            "angle_limits": checked_limits("angle_limits", self.angle_limits, "rad"),
         }
         for name, value in checked.items():
             object.__setattr__(self, name, value)
@@ -144,19 +126,9 @@ class HelixDesign(Summarised):
         return Deviation(radius - self.wish.radius, rise - self.wish.turn_height, relative)
 
     @property
-    def faults(self) -> tuple[str, ...]:
-        """Reasons why the design cannot be built, one sentence each; empty if it can."""
-        sentences = [str(self.contact)] if bool(self.contact.touches) else []
-        for name, unit, limits in (("contraction", "", self.contraction_limits), ("angle", " rad", self.angle_limits)):
-            value = getattr(self, name)
-            if limits is not None and not within(np.asarray(value), limits, LIMIT_ROUNDING):
-                sentences.append(f"the {name} is {value:.4g}{unit}, which must be in [{limits[0]:.4g}, {limits[1]:.4g}]{unit}")
-        return tuple(sentences)
-
-    @property
     def realisable(self) -> bool:
-        """Whether the tube is free of contact and the actuator within its limits."""
-        return not self.faults
+        """Whether the tube is free of contact."""
+        return not bool(self.contact.touches)
 
     def summary_parts(self) -> list[Part]:
         """Return a description, one fact a line; lengths in millimetres, angles in degrees."""
@@ -178,96 +150,13 @@ class HelixDesign(Summarised):
                 f"Deviation: radius {deviation.radius * 1e3:+.3f} mm, rise {deviation.turn_height * 1e3:+.3f} mm a turn, "
                 f"distance {deviation.distance:.4g}",
             ]
-        lines += [f"CANNOT BE MADE: {fault}" for fault in self.faults]
+        lines += [] if self.realisable else [f"CANNOT BE MADE: {self.contact}"]
         return ["\n".join(lines)]
-
-    def save(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-        """Save the design as JSON: numbers in SI units and radians, full precision.
-
-        Args:
-            path: File to write.
-            overwrite: Replace an existing file.
-
-        Returns:
-            The path of the file.
-
-        Raises:
-            ParameterError: If `path` is not a path.
-            OutputExists: If the file exists and `overwrite` is false.
-            OutputError: If the file cannot be written.
-        """
-        document = {
-            "softrobots_helix_design": _FORMAT,
-            **{name: getattr(self, name) for name in _SAVED},
-            "wish": None if self.wish is None else self.wish._asdict(),
-            "computed": _computed(self),
-        }
-        return write_text(path, json.dumps(document, indent=2, allow_nan=False) + "\n", overwrite=overwrite)
-
-    @classmethod
-    def load(cls, path: str | os.PathLike[str]) -> HelixDesign:
-        """Load a design saved by `save`; derived numbers are computed again and compared with those in the file.
-
-        Args:
-            path: The JSON file.
-
-        Returns:
-            The design.
-
-        Raises:
-            ParameterError: If `path` is not a path.
-            FileFormatError: If the file cannot be read, was not written by `save`, or its derived numbers do not match.
-        """
-        file = as_path("path", path)
-        document = read_json(file, _LARGEST_FILE)
-        try:
-            if document["softrobots_helix_design"] != _FORMAT:
-                raise ValueError(f"it is in format {document['softrobots_helix_design']!r}; format {_FORMAT} is required")
-            wish = document["wish"] and Wish(**document["wish"])
-            design = cls(**{name: document[name] for name in _SAVED}, wish=wish)
-            for name, number in _computed(design).items():
-                claimed, rounding = document["computed"][name], _AGREEMENT * design.diameter
-                if not math.isclose(number, claimed, rel_tol=_AGREEMENT, abs_tol=rounding):
-                    raise ValueError(f"its {name} is {claimed}, but {number} follows from its other numbers")
-        except (ValueError, TypeError, KeyError, AttributeError, OverflowError) as error:
-            reason = f"it has no {error}" if isinstance(error, KeyError) else error
-            raise FileFormatError(f"cannot read a helix design from {file}: {reason}") from error
-        return design
-
-
-def _computed(design: HelixDesign) -> dict[str, float]:
-    """Derived numbers that are written to the file of a design."""
-    return {
-        "tube_length": design.tube_length,
-        "outer_radius": float(design.shape.outer_radius),
-        "inner_radius": float(design.shape.inner_radius),
-        "pitch": float(design.shape.pitch),
-    }
 
 
 def distance(radius_ratio: Any, height_ratio: Any) -> FloatArray:
     """Distance of two helices from the ratios of their radii and turn heights, positive: `hypot` of the logarithms."""
     return np.asarray(np.hypot(np.log(radius_ratio), np.log(height_ratio)))
-
-
-def within(value: FloatArray, limits: Limits | None, rounding: float) -> BoolArray:
-    """Whether values lie within limits, up to rounding; always if the limits are None."""
-    if limits is None:
-        return np.ones(np.shape(value), dtype=np.bool_)
-    return np.asarray((value >= limits[0] - rounding) & (value <= limits[1] + rounding))
-
-
-def checked_limits(name: str, limits: Any, unit: str) -> Limits | None:
-    """Return limits as a pair in order and in range, or None if they are None, or raise ParameterError."""
-    if limits is None:
-        return None
-    contraction = name == "contraction_limits"
-    requirement = "a pair (low, high) " + ("in (0, 1]" if contraction else "in [0, pi/2) rad") + ", low not above high"
-    low, high = (finite_number(name, value, unit) for value in listed(name, limits, 2, requirement))
-    fits = 0.0 < low <= high <= 1.0 if contraction else 0.0 <= low <= high < 0.5 * math.pi
-    if not fits:
-        raise ParameterError(name, limits, requirement)
-    return low, high
 
 
 def _checked_wish(wish: Any) -> Wish | None:
@@ -284,3 +173,18 @@ def _checked_wish(wish: Any) -> Wish | None:
 def in_mm(length: Any) -> str:
     """Return a length [m] as text in millimetres."""
     return f"{float(length) * 1e3:.2f} mm"
+
+
+def _packed(design: HelixDesign) -> dict[str, Any]:
+    """What a file holds."""
+    wish = {} if design.wish is None else {f"wish_{name}": value for name, value in design.wish._asdict().items()}
+    return {name: np.array(value) for name, value in ({name: getattr(design, name) for name in _SAVED} | wish).items()}
+
+
+def _unpacked(fields: Mapping[str, Any]) -> HelixDesign:
+    """Design of named arrays."""
+    wish = Wish(*(fields[f"wish_{name}"].item() for name in Wish._fields)) if "wish_purpose" in fields else None
+    return HelixDesign(**{name: fields[name].item() for name in _SAVED}, wish=wish)
+
+
+KINDS.update(helix_design=Kind(HelixDesign, _packed, _unpacked))

@@ -2,8 +2,8 @@ r"""Inverse design of a helix: from an object to grasp, or an antenna to hold, t
 
 A grasp requires the inner path on the object, an antenna the centre line on a cylinder; both require a rise per turn. Diameter
 of the tube and turns are given. [Blumenschein 2018] (6, 7, 11) then give contraction and angle of the actuator. If such a tube
-would run into itself, or the actuator is outside its limits, the caller chooses: an error, a warning, or the nearest realisable
-helix (ours). The distance of a helix from the required one is
+would run into itself, the caller chooses: an error, a warning, or the nearest realisable helix (ours). The distance of a helix
+from the required one is
 
 .. math:: m = \sqrt{\ln^2\frac{R}{R_w} + \ln^2\frac{h}{h_w}}, \qquad h = 2\pi b
 
@@ -14,8 +14,7 @@ requirement outside lies on its border, which consists of these curves, each in 
 - turns touch where their distance has its minimum, at the turn angle `s` from 4.493 (where `tan s = s`) to `2 pi`:
   :math:`R_c = D/\sqrt{2(1 - \cos s) - s\sin s}`, :math:`b = R_c\sqrt{-\sin(s)/s}`;
 - the ends of a tube of less than a turn, `s` apart, touch: :math:`4 R_c^2\sin^2(s/2) + b^2 s^2 = D^2`;
-- the tube folds: :math:`R_c^2 + b^2 = R_c D/2`;
-- a limit of the contraction or of the angle is reached.
+- the tube folds: :math:`R_c^2 + b^2 = R_c D/2`.
 
 Each curve is sampled, points that are not realisable are left out, and the best ones are refined.
 """
@@ -32,7 +31,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, choice, non_negative_number, positive_number
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.helix.contact import BoolArray, self_contact
-from softrobots.helix.design import LIMIT_ROUNDING, DesignWarning, HelixDesign, Limits, Wish, checked_limits, distance, within
+from softrobots.helix.design import DesignWarning, HelixDesign, Wish, distance
 from softrobots.helix.shapes import HelixShape, inverse
 
 ON_UNREALISABLE = ("error", "nearest", "warn")
@@ -58,8 +57,6 @@ def design_grasp(
     squeeze: float = 0.0,
     handedness: str = "right",
     on_unrealisable: str = "error",
-    contraction_limits: Limits | None = None,
-    angle_limits: Limits | None = None,
 ) -> HelixDesign:
     """Design actuator and tube that wrap around an object: the inner path lies on it.
 
@@ -71,18 +68,15 @@ def design_grasp(
         squeeze: Radius of the object minus the natural inner radius of the helix, from 0 to below the radius of the object [m].
             A squeezed object is held (`grasp_force`), one that is just wrapped is not.
         handedness: "right" or "left".
-        on_unrealisable: What to do if the tube would run into itself or a limit is passed: one of `ON_UNREALISABLE`. "error" to
-            raise, "nearest" to take the nearest realisable helix (see the module), "warn" to return the required helix with its
-            `faults` and `contact`, and issue a `DesignWarning`.
-        contraction_limits: Smallest and largest contraction of the actuator, within (0, 1]; None for no limit [-].
-        angle_limits: Smallest and largest angle of the actuator, within [0, pi/2); None for no limit [rad].
+        on_unrealisable: What to do if the tube would run into itself: one of `ON_UNREALISABLE`. "error" to raise, "nearest" to
+            take the nearest realisable helix (see the module), "warn" to return the required helix with its `contact`, and
+            issue a `DesignWarning`.
 
     Returns:
         The design.
 
     Raises:
-        ParameterError: If an argument is out of range; if a limit is passed and `on_unrealisable` is "error"; or if no helix
-            within the limits is realisable.
+        ParameterError: If an argument is out of range.
         SelfIntersection: If the tube would run into itself and `on_unrealisable` is "error".
         StraightTube: If the helix is straight within rounding.
     """
@@ -91,7 +85,7 @@ def design_grasp(
     if squeeze_depth >= radius:
         raise ParameterError("squeeze", squeeze, f"less than the radius of the object, {radius} m")
     required = Wish("grasp", "inner", radius - squeeze_depth, positive_number("turn_height", turn_height, "m"), squeeze_depth)
-    return _design(required, diameter, turns, handedness, on_unrealisable, contraction_limits, angle_limits)
+    return _design(required, diameter, turns, handedness, on_unrealisable)
 
 
 def design_antenna(
@@ -102,8 +96,6 @@ def design_antenna(
     turns: float,
     handedness: str = "right",
     on_unrealisable: str = "error",
-    contraction_limits: Limits | None = None,
-    angle_limits: Limits | None = None,
 ) -> HelixDesign:
     """Design actuator and tube of a helical antenna: the centre line of the tube has the required radius.
 
@@ -114,8 +106,6 @@ def design_antenna(
         turns: Turns, positive [-].
         handedness: "right" or "left".
         on_unrealisable: As in `design_grasp`.
-        contraction_limits: As in `design_grasp` [-].
-        angle_limits: As in `design_grasp` [rad].
 
     Returns:
         The design.
@@ -127,22 +117,12 @@ def design_antenna(
     """
     rise = positive_number("turn_height", turn_height, "m")
     required = Wish("antenna", "centre", positive_number("radius", radius, "m"), rise)
-    return _design(required, diameter, turns, handedness, on_unrealisable, contraction_limits, angle_limits)
+    return _design(required, diameter, turns, handedness, on_unrealisable)
 
 
-def _design(
-    required: Wish,
-    diameter: float,
-    turns: float,
-    handedness: str,
-    on_unrealisable: str,
-    contraction_limits: Limits | None,
-    angle_limits: Limits | None,
-) -> HelixDesign:
+def _design(required: Wish, diameter: float, turns: float, handedness: str, on_unrealisable: str) -> HelixDesign:
     """The design of the required helix, or of the realisable one nearest to it."""
     choice("on_unrealisable", on_unrealisable, ON_UNREALISABLE)
-    contraction_range = checked_limits("contraction_limits", contraction_limits, "-")
-    angle_range = checked_limits("angle_limits", angle_limits, "rad")
     tube, count = positive_number("diameter", diameter, "m"), positive_number("turns", turns, "-")
     for name, length in (("radius", required.radius), ("turn_height", required.turn_height)):
         if not tube / _EXTREME <= length <= tube * _EXTREME:
@@ -150,41 +130,31 @@ def _design(
     outwards = tube if required.path == "inner" else 0.5 * tube  # from the required path to the outer one
     required_shape = _helix(required.radius + outwards - 0.5 * tube, required.turn_height / (2.0 * math.pi), tube)
 
-    def design_of(shape: HelixShape, *, clipped: bool) -> HelixDesign:
+    def design_of(shape: HelixShape) -> HelixDesign:
         contraction, angle, _ = (float(value) for value in inverse(shape))
-        if clipped:
-            contraction = float(np.clip(contraction, *(contraction_range or (contraction, contraction))))
-            angle = float(np.clip(angle, *(angle_range or (angle, angle))))
-        return HelixDesign(contraction, angle, tube, count, handedness, required, contraction_range, angle_range)
+        return HelixDesign(contraction, angle, tube, count, handedness, required)
 
-    design = design_of(required_shape, clipped=False)
+    design = design_of(required_shape)
     if design.realisable:
         return design
     if on_unrealisable == "nearest":
-        search = _NearestHelix(required, tube, count, contraction_range, angle_range)
-        return design_of(search.nearest(), clipped=True)
-    faults, advice = "; ".join(design.faults), "on_unrealisable='nearest' gives the nearest helix that can be made"
+        return design_of(_NearestHelix(required, tube, count).nearest())
+    contact, advice = str(design.contact), "on_unrealisable='nearest' gives the nearest helix that can be made"
     if on_unrealisable == "warn":
-        warnings.warn(DesignWarning(faults, design=design), stacklevel=3)
+        warnings.warn(DesignWarning(contact, design=design), stacklevel=3)
         return design
-    if bool(design.contact.touches):
-        raise SelfIntersection(f"{faults}; {advice}", contact=design.contact)
-    reached = within(np.asarray(design.contraction), contraction_range, LIMIT_ROUNDING)
-    name = "angle_limits" if reached else "contraction_limits"
-    raise ParameterError(name, getattr(design, name), f"wide enough for the required helix ({faults}); {advice}")
+    raise SelfIntersection(f"{contact}; {advice}", contact=design.contact)
 
 
 class _NearestHelix(NamedTuple):
-    """Search for the realisable helix nearest to a required one, for a diameter, turns and limits of the actuator."""
+    """Search for the realisable helix nearest to a required one, for a diameter and turns."""
 
     required: Wish
     diameter: float
     turns: float
-    contraction_limits: Limits | None
-    angle_limits: Limits | None
 
     def nearest(self) -> HelixShape:
-        """Return the nearest helix that is free of contact (turns may just touch) and within the limits, if there is one."""
+        """Return the nearest helix that is free of contact; turns may just touch."""
         best = (math.inf, 0.0, 0.0)
         for curve in self._border():
 
@@ -200,11 +170,6 @@ class _NearestHelix(NamedTuple):
                 if value < best[0]:
                     radius, pitch = curve(np.array([parameter]))
                     best = (value, float(radius[0]), float(pitch[0]))
-        if math.isinf(best[0]):
-            name = "angle_limits" if self.contraction_limits is None else "contraction_limits"
-            limits = f"{self.contraction_limits}" + (f" and angles in {self.angle_limits}" if self.angle_limits else "")
-            room = " and has room for the object inside" if self.required.path == "inner" else ""
-            raise ParameterError(name, limits, "such that some helix within the limits is free of contact" + room)
         return _helix(best[1], best[2], self.diameter)
 
     def _path_radius(self, centre_radius: FloatArray) -> FloatArray:
@@ -212,14 +177,13 @@ class _NearestHelix(NamedTuple):
         return np.asarray(centre_radius - (0.5 * self.diameter if self.required.path == "inner" else 0.0))
 
     def _realisable(self, radius: FloatArray, pitch: FloatArray) -> BoolArray:
-        """Whether helices exist, are free of contact, within the limits, and leave room for the object."""
+        """Whether helices exist, are free of contact, and leave room for the object."""
         size, path = self.diameter, self._path_radius(radius)
         usable = (path > _ROUNDING * size) & (pitch > _ROUNDING * size) & (np.hypot(radius, pitch) < size / _ROUNDING)
         shape = _helix(np.where(usable, radius, size), np.where(usable, pitch, size), size)
-        actuator, contact = inverse(shape), self_contact(shape, self.turns)
+        contact = self_contact(shape, self.turns)
         usable &= (contact.fold_margin >= -_ROUNDING) & ~(contact.has_neighbours & (contact.turn_clearance < -_ROUNDING * size))
-        usable &= within(actuator.contraction, self.contraction_limits, _ROUNDING)
-        return np.asarray(usable & within(actuator.angle, self.angle_limits, _ROUNDING))
+        return np.asarray(usable)
 
     def _border(self) -> list[_Curve]:
         """The curves that bound the realisable helices."""
@@ -239,25 +203,7 @@ class _NearestHelix(NamedTuple):
             turned = math.pi * parameter
             return 0.25 * size * (1.0 + np.cos(turned)), 0.25 * size * np.sin(turned)
 
-        def of_actuator(shrink: FloatArray | float, angle: FloatArray | float) -> tuple[FloatArray, FloatArray]:
-            contraction = 1.0 - np.asarray(shrink)
-            square = np.asarray(shrink) ** 2 + 4.0 * contraction * np.sin(angle) ** 2 + 1e-300  # |1 - zeta|^2
-            radius = 0.5 * size * shrink * (1.0 + contraction) / square
-            return radius, size * contraction * np.sin(2.0 * np.asarray(angle)) / square
-
-        contractions, angles = self.contraction_limits or (0.0, 1.0), self.angle_limits or (0.0, 0.5 * math.pi)
-
-        def at_contraction(contraction: float) -> _Curve:
-            return lambda p: of_actuator(1.0 - contraction, angles[0] + (angles[1] - angles[0]) * _graded(p))
-
-        def at_angle(angle: float) -> _Curve:
-            return lambda p: of_actuator(1.0 - contractions[1] + (contractions[1] - contractions[0]) * _graded(p), angle)
-
-        curves: list[_Curve] = [touching, folding]
-        curves += [ends] if 0.5 < self.turns < 1.0 else []
-        curves += [at_contraction(contraction) for contraction in self.contraction_limits or ()]
-        curves += [at_angle(angle) for angle in self.angle_limits or ()]
-        return curves
+        return [touching, folding, *([ends] if 0.5 < self.turns < 1.0 else [])]
 
 
 def _helix(radius: FloatArray | float, pitch: FloatArray | float, diameter: float) -> HelixShape:

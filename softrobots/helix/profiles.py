@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import LARGEST, FloatArray, finite_array, finite_number, positive_integer
+from softrobots.core.checks import LARGEST, FloatArray, finite_array, finite_number
 from softrobots.core.errors import ParameterError
 from softrobots.helix.shapes import ANGLE_RANGE, CONTRACTION_RANGE
 
@@ -17,7 +17,6 @@ _RANGES = {
     "contraction": (1.0 / LARGEST, 1.0, CONTRACTION_RANGE, "-"),
     "angle": (0.0, math.nextafter(0.5 * math.pi, 0.0), ANGLE_RANGE, "rad"),
 }
-_MOST_SAMPLES = 1_000_000
 _ROUNDING = 1e-12  # of the length: how much too early a table may end
 
 
@@ -42,14 +41,12 @@ class Profile:
         return [knot for knot in self.positions.tolist() if 0.0 < knot < self.length]
 
     def on_piece(self, start: float, end: float) -> Callable[[float], float]:
-        """Return the profile between two neighbouring breakpoints, at both ends with the limits from inside.
+        """Return the profile between two neighbouring knots, that of a table at both ends with the limits from inside.
 
         The function of the position [m] that is returned raises ParameterError where the value is invalid.
         """
         if self.function is not None:
-            first = start if start == 0.0 else math.nextafter(start, math.inf)  # a function may jump at a breakpoint
-            last = end if end == self.length else math.nextafter(end, -math.inf)
-            return lambda position: self._call(min(max(position, first), last))
+            return self._call
         place = min(int(np.searchsorted(self.positions, start, side="right")), len(self.positions) - 1)
         left, right = self.positions[place - 1 : place + 1].tolist()
         value, after = self.values[place - 1 : place + 1].tolist()
@@ -105,18 +102,3 @@ def checked_profile(name: str, given: Any, length: float) -> Profile:
         where = f" at the position {float(positions[wrong[0]])!r} m"
         raise ParameterError(name, float(values[wrong[0]]), requirement + where)
     return Profile(name, length, None, positions, values)
-
-
-def sample_positions(samples: Any, length: float) -> FloatArray:
-    """Return positions along the tube, shape (n,) [m], from their number (both ends included) or the positions themselves."""
-    if not isinstance(samples, tuple | list | np.ndarray):
-        count = positive_integer("samples", samples, _MOST_SAMPLES)
-        if count < 2:
-            raise ParameterError("samples", samples, "at least 2, or positions [m]")
-        return np.linspace(0.0, length, count)
-    positions = finite_array("samples", samples, (None,), "m")
-    if not 0 < len(positions) <= _MOST_SAMPLES or np.any(np.diff(positions) <= 0.0):
-        raise ParameterError("samples", samples, f"1 to {_MOST_SAMPLES} increasing positions [m]")
-    if positions[0] < 0.0 or positions[-1] > length:
-        raise ParameterError("samples", samples, f"positions from 0 to the length {length!r} m")
-    return positions

@@ -13,7 +13,6 @@ from pathlib import Path
 
 import numpy as np
 
-from softrobots.core.checks import positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.core.files import as_path, csv_text, new_file, write_text
 from softrobots.helix.design import in_mm
@@ -22,7 +21,7 @@ from softrobots.helix.template_drawing import TEXT, Window, draw_sheet, element,
 
 _ROUNDING = 1e-9  # of a page
 _THINNEST, _THICKEST, _LONGEST = 1e-3, 10.0, 200.0  # tubes that can be drawn [m]
-_MOST_PAGES = 500
+_PAGE, _OVERLAP = 250.0, 20.0  # tube on a page, and the part of it that the next page repeats [mm]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 18.0, 12.0, 42.0, 54.0  # margins around the sheet [mm]
 _TEXT_WIDTH = 252.0  # of title and instructions [mm]
 _LINE_HEIGHT = 4.8
@@ -55,53 +54,36 @@ def write_template(pattern: Pattern, path: str | os.PathLike[str], *, overwrite:
     return write_text(path, _svg_text(pattern, Window(0.0, 1e3 * pattern.tube_length)), overwrite=overwrite)
 
 
-def write_template_pages(
-    pattern: Pattern,
-    path: str | os.PathLike[str],
-    page_length: float = 0.25,
-    overlap: float = 0.02,
-    *,
-    overwrite: bool = False,
-) -> tuple[Path, ...]:
-    """Draw the unrolled tube to scale on pages to be glued together; neighbours overlap and share a join line.
+def write_template_pages(pattern: Pattern, path: str | os.PathLike[str], *, overwrite: bool = False) -> tuple[Path, ...]:
+    """Draw the unrolled tube to scale on pages of A4 in landscape format, to be glued together at join lines that they share.
 
     Args:
         pattern: The plan.
         path: Name of the files, to which the page number is added: `tube` and `tube.svg` give `tube-1.svg`, `tube-2.svg`, ...
-        page_length: Length of the tube on a page; 0.25 m fits A4 in landscape format [m].
-        overlap: Part of it that the next page repeats, at most half [m].
         overwrite: Replace existing files.
 
     Returns:
         The paths of the files.
 
     Raises:
-        ParameterError: If `pattern` is not a `Pattern`, `path` is not a path, a length is out of range, there would be more
-            than 500 pages, or the tube is too thin, thick or long as in `write_template`.
+        ParameterError: If `pattern` is not a `Pattern`, `path` is not a path, or the tube is too thin, thick or long as in
+            `write_template`.
         OutputExists: If one of the files exists and `overwrite` is false; then none is written.
         OutputError: If a file cannot be written.
     """
-    page, common = 1e3 * positive_number("page_length", page_length, "m"), 1e3 * positive_number("overlap", overlap, "m")
     _check_drawable(checked_pattern(pattern))
-    length = 1e3 * pattern.tube_length
-    if common > 0.5 * page:
-        raise ParameterError("overlap", overlap, f"at most half the page length {page_length} m")
-    step, base = page - common, as_path("path", path)
+    length, step, base = 1e3 * pattern.tube_length, _PAGE - _OVERLAP, as_path("path", path)
     if not base.name:
         raise ParameterError("path", path, "a file name, to which page numbers are added")
-    if length > step * _MOST_PAGES:
-        raise ParameterError(
-            "page_length", page_length, f"such that {_MOST_PAGES} pages are enough for {pattern.tube_length} m"
-        )
-    count = max(1, math.ceil((length - common) / step - _ROUNDING))
+    count = max(1, math.ceil((length - _OVERLAP) / step - _ROUNDING))
     digits = len(str(count))
     targets = [
         new_file(base.with_name(f"{base.stem}-{n + 1:0{digits}}{base.suffix or '.svg'}"), overwrite=overwrite)
         for n in range(count)
     ]
-    joins = [step * n + 0.5 * common for n in range(1, count)]  # in the middle of the overlap of two pages
+    joins = [step * n + 0.5 * _OVERLAP for n in range(1, count)]  # in the middle of the overlap of two pages
     for n, target in enumerate(targets):
-        window = Window(step * n, min(step * n + page, length), n + 1, count, tuple(joins[max(n - 1, 0) : n + 1]))
+        window = Window(step * n, min(step * n + _PAGE, length), n + 1, count, tuple(joins[max(n - 1, 0) : n + 1]))
         write_text(target, _svg_text(pattern, window), overwrite=overwrite)
     return tuple(targets)
 
@@ -177,12 +159,12 @@ def _draw_title(root: ET.Element, plan: Pattern, left: float, page: str) -> None
         ),
         (
             f"Actuator line at {math.degrees(plan.angle):.3f} degrees to the axis of the tube",
-            f"Line {in_mm(plan.line_length)}, plain {in_mm(plan.plain_start)} at base, {in_mm(plan.plain_end)} at tip",
+            f"Line {in_mm(plan.line_length)}",
             f"{plan.count} {noun_plural}, spacing {in_mm(plan.spacing)} along the line",
             f"Each period: {in_mm(plan.remaining_length)} stays, {in_mm(plan.pinch_length)} {removed}",
         ),
         (
-            f"Contraction {plan.contraction:.4f}; {plan.resulting_contraction:.4f} with plain ends",
+            f"Contraction {plan.contraction:.4f}",
             f"Outer radius Ro {in_mm(shape.outer_radius)}",
             f"Inner radius Ri {in_mm(shape.inner_radius)}",
             f"Turn height {in_mm(shape.turn_height)}, {plan.turns:.3f} turns",

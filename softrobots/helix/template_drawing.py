@@ -99,15 +99,14 @@ class _Line(NamedTuple):
 def _wrapped(plan: Pattern, around: float) -> list[tuple[Point, Point, int]]:
     """Straight pieces of the actuator line on the sheet: both ends [mm] and the wrap."""
     sign, length = turning_sign(plan.handedness), 1e3 * plan.tube_length
-    slope, first = sign * math.tan(plan.angle), 0.5e3 * plan.diameter * plan.start_azimuth
-    last = first + slope * length
-    low, high = min(first, last), max(first, last)
-    crossings = [k * around for k in range(math.floor(low / around) + 1, math.ceil(high / around))]
-    levels = [first, *(crossings if sign > 0.0 else reversed(crossings)), last]
+    slope = sign * math.tan(plan.angle)
+    last = slope * length
+    crossings = [sign * k * around for k in range(1, math.ceil(abs(last) / around))]
+    levels = [0.0, *crossings, last]
     pieces = []
     for start, end in itertools.pairwise(levels):
         wrap = math.floor(0.5 * (start + end) / around)
-        x0, x1 = (0.0, length) if first == last else ((start - first) / slope, (end - first) / slope)
+        x0, x1 = (0.0, length) if last == 0.0 else (start / slope, end / slope)
         pieces.append(((x0, start - wrap * around), (x1, end - wrap * around), wrap))
     return pieces
 

@@ -22,16 +22,17 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, choice, finite_array, finite_number, positive_number, read_only
+from softrobots.core.checks import FloatArray, choice, positive_integer, positive_number, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.core.summary import Summarised
 from softrobots.helix.paths import actuator_curvature_torsion
-from softrobots.helix.profiles import Profile, checked_profile, sample_positions
+from softrobots.helix.profiles import Profile, checked_profile
 from softrobots.helix.shapes import PATHS, turning_sign
 
 _MOST_ROTATION = 1e5  # rad along the tube, about 16000 turns: half a minute of integration
 _EVALUATIONS, _EVALUATIONS_PER_RAD = 500_000, 50  # several times what smooth tubes need
-_TIGHTEST, _LOOSEST = 1e-13, 1e-3
+_STEP_ERROR = 1e-12  # of a step of the integrator: of lengths relative to the tube's, of rotations in rad
+_MOST_SAMPLES = 1_000_000
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -64,21 +65,6 @@ class BentTube(Summarised):
         for name in ("rest_positions", "poses", "arc_length", "contraction", "angle", "curvature", "torsion"):
             object.__setattr__(self, name, read_only(np.array(getattr(self, name), dtype=np.float64)))
 
-    @property
-    def centre_line(self) -> FloatArray:
-        """Points of the centre line, shape (n, 3) [m]."""
-        return self.points("centre")
-
-    @property
-    def inner_line(self) -> FloatArray:
-        """Points of the actuator, shape (n, 3) [m]."""
-        return self.points("inner")
-
-    @property
-    def outer_line(self) -> FloatArray:
-        """Points of the line opposite the actuator, shape (n, 3) [m]."""
-        return self.points("outer")
-
     def points(self, path: str = "centre") -> FloatArray:
         """Return points of one of `PATHS`, shape (n, 3) [m].
 
@@ -96,16 +82,14 @@ def bent_tube(
     length: float,
     *,
     handedness: str = "right",
-    samples: Any = 201,
-    tolerance: float = 1e-12,
-    breakpoints: Any = (),
+    samples: int = 201,
 ) -> BentTube:
     """Integrate the shape of a tube with an actuator that varies along it; frames of the module, SciPy's DOP853.
 
     Contraction and angle are each a number, a function that takes a position [m] and returns a number, or a pair
     (positions, values): linear between them, with a jump where a position occurs twice. The integration restarts at the
-    positions of tables and at breakpoints. With functions its steps are at most the diameter, or 1/10000 of the tube if that is
-    longer, so that it does not miss their changes. The tube starts at the origin along z, with the actuator on the side of x.
+    positions of tables. With functions its steps are at most the diameter, or 1/10000 of the tube if that is longer, so that it
+    does not miss their changes. The tube starts at the origin along z, with the actuator on the side of x.
     It may be straight (contraction 1, angle 0) or have straight pieces. Self-contact is not checked.
 
     Args:
@@ -114,10 +98,7 @@ def bent_tube(
         diameter: Diameter `D` of the tube, positive [m].
         length: Length of the uninflated tube, positive [m].
         handedness: "right" or "left".
-        samples: Number of equally spaced samples including both ends, at least 2; or increasing positions in [0, length] [m].
-        tolerance: Error of one step of the integrator, of lengths relative to the tube's and of rotations in rad, from 1e-13 to
-            1e-3.
-        breakpoints: Positions where a function jumps or has a kink, increasing, inside the tube [m].
+        samples: Number of equally spaced samples including both ends, at least 2.
 
     Returns:
         The sampled tube.
@@ -125,19 +106,15 @@ def bent_tube(
     Raises:
         ParameterError: If an argument is out of range; a function raises or does not return one number in range (the error
             names the position); a table does not extend from 0 to the length; the tube turns by more than 1e5 rad; or the
-            integrator does not converge, for a function that is not smooth between breakpoints.
+            integrator does not converge, for a function that is not smooth.
     """
     diameter, length = positive_number("diameter", diameter, "m"), positive_number("length", length, "m")
     sign = turning_sign(handedness)
-    accuracy = finite_number("tolerance", tolerance)
-    if not _TIGHTEST <= accuracy <= _LOOSEST:
-        raise ParameterError("tolerance", tolerance, f"from {_TIGHTEST:g} to {_LOOSEST:g}")
     contractions, angles = checked_profile("contraction", contraction, length), checked_profile("angle", angle, length)
-    positions = sample_positions(samples, length)
-    breaks = finite_array("breakpoints", breakpoints, (None,), "m")
-    if np.any(breaks <= 0.0) or np.any(breaks >= length) or np.any(np.diff(breaks) <= 0.0):
-        raise ParameterError("breakpoints", breakpoints, f"increasing, inside the tube, 0 to {length!r} m")
-    ends = sorted({0.0, *contractions.knots, *angles.knots, *breaks.tolist(), length})
+    if positive_integer("samples", samples, _MOST_SAMPLES) < 2:
+        raise ParameterError("samples", samples, "at least 2")
+    positions = np.linspace(0.0, length, samples)
+    ends = sorted({0.0, *contractions.knots, *angles.knots, length})
     pieces = [_Piece(contractions, angles, start, end, diameter, sign) for start, end in itertools.pairwise(ends)]
     piece_numbers = np.clip(np.searchsorted(ends, positions, side="right") - 1, 0, len(pieces) - 1)
     actuators = np.array([pieces[i].actuator(s) for i, s in zip(piece_numbers.tolist(), positions.tolist(), strict=True)])
@@ -147,7 +124,6 @@ def bent_tube(
     states = _integrate(
         [(piece, positions[piece_numbers == place]) for place, piece in enumerate(pieces)],
         scale=scale,
-        accuracy=accuracy,
         longest=math.inf if smooth else max(diameter, 1e-4 * length),
         budget=budget,
     )
@@ -167,7 +143,7 @@ def bent_tube(
 
 
 class _Piece:
-    """The tube between two neighbouring breakpoints."""
+    """The tube between two neighbouring knots of its tables."""
 
     def __init__(self, contractions: Profile, angles: Profile, start: float, end: float, diameter: float, sign: float) -> None:
         self.start, self.end = start, end
@@ -224,18 +200,14 @@ def _scale(pieces: list[_Piece], positions: FloatArray, length: float, diameter:
     return max(total, length), rotation
 
 
-def _integrate(
-    parts: list[tuple[_Piece, FloatArray]], *, scale: float, accuracy: float, longest: float, budget: int
-) -> FloatArray:
+def _integrate(parts: list[tuple[_Piece, FloatArray]], *, scale: float, longest: float, budget: int) -> FloatArray:
     """States at the samples in each piece, shape (n, 8)."""
     from scipy.integrate import solve_ivp  # here, because importing it takes longer than all of this package
 
-    starts = [piece.start for piece, _ in parts[1:]]
     evaluations = 0
 
     def stuck(place: float, why: str) -> ParameterError:
-        requirement = f"such that contraction and angle are smooth between them (stuck at the position {place!r} m: {why})"
-        return ParameterError("breakpoints", starts, requirement)
+        return ParameterError("contraction and angle", place, f"smooth functions (stuck at this position [m]: {why})")
 
     state = np.array([1.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0])
     states = [np.zeros((0, 8))]
@@ -250,7 +222,7 @@ def _integrate(
 
         times = samples if len(samples) and samples[-1] == piece.end else np.append(samples, piece.end)
         span = (piece.start, piece.end)
-        solution = solve_ivp(counted, span, state, "DOP853", times, max_step=longest, rtol=accuracy, atol=accuracy)
+        solution = solve_ivp(counted, span, state, "DOP853", times, max_step=longest, rtol=_STEP_ERROR, atol=_STEP_ERROR)
         if not solution.success:
             raise stuck(piece.start, str(solution.message))
         states.append(solution.y.T[: len(samples)])

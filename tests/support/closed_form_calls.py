@@ -15,17 +15,16 @@ from softrobots.compiled.sweeps import TargetGrid
 
 ARC = cc.Arc(0.5, 0.8, 0.7)
 SHAPE = helix.forward(0.66, 0.0873, 0.0331)
-PLAN = helix.pinch_pattern((0.66, 0.0873, 0.0331, 0.2), 0.02)
 DESIGN = helix.design_antenna(0.07, 0.18, diameter=0.0331, turns=3)
-TABLES = [helix.ActuatorTable([0.0, 5e4, 8e4], [0.6, 0.7, 0.8], kind) for kind in helix.INTERPOLATIONS]
+PLAN = helix.pinch_pattern(helix.HelixDesign(0.66, 0.0873, 0.0331, 0.4), 0.02)
+TABLE = helix.ActuatorTable([0.0, 5e4, 8e4], [0.6, 0.7, 0.8])
 BENT = np.linspace(0.001, 0.25, 12)
 WALL = {"length": 0.6, "radius": 0.055, "wall_thickness": 0.0005, "pressure": 3e4, "poisson_ratio": 0.3}
 ACTUATOR = {"contraction": 0.66, "angle": 0.0873, "diameter": 0.0331}
 CURVE = {"shape": SHAPE, "s": 1.0, "path": "inner", "handedness": "left"}
 MUSCLES = {"lengths": [0.5, 0.51, 0.52], "distance": 0.04, "azimuths": [0.0, 2.0, 4.0]}
 CHAIN = {"arcs": [ARC, ARC], "offsets": [0.0, 1.0], "frame": "torsion_free"}
-DESIGNED = {"turn_height": 0.18, "diameter": 0.0331, "turns": 3.0, "handedness": "right"}
-LIMITED = {"on_unrealisable": "error", "contraction_limits": (0.3, 0.9), "angle_limits": (0.02, 1.0)}
+DESIGNED = {"turn_height": 0.18, "diameter": 0.0331, "turns": 3.0, "handedness": "right", "on_unrealisable": "error"}
 
 
 def _whole_arc(length: Any, bending: Any, azimuth: Any, s: Any) -> Any:
@@ -52,11 +51,6 @@ def _whole_test(angle: Any, displacement: Any, force: Any, **geometry: Any) -> A
     test = inflated_beam.BendingTest(**geometry)
     found = test.displacement(angle), test.angle(displacement), test.contact(angle), test.moment(displacement, force)
     return test.arm, *found, test.small_angles(displacement, force)
-
-
-def _whole_plan(contraction: Any, angle: Any, diameter: Any, length: Any, **options: Any) -> Any:
-    plan = helix.pinch_pattern((contraction, angle, diameter, length), **options)
-    return plan, plan.locate([0.0, plan.line_length])
 
 
 def _whole_design(**arguments: Any) -> Any:
@@ -162,36 +156,23 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     ),
     "GraspTest.force": (helix.PAPER_CYLINDER.force, {"pressure": 1e4, "deflection": 0.002}),
     "contraction_from_stoppers": (helix.contraction_from_stoppers, {"stopper": 0.01, "gap": 0.01}),
-    "gap_for": (helix.gap_for, {"contraction": 0.66, "stopper": 0.01}),
-    "pinch_pattern": (
-        _whole_plan,
-        {
-            **ACTUATOR,
-            "length": 0.5,
-            "spacing": 0.02,
-            "method": "tape",
-            "remainder": "both",
-            "start_azimuth": 1.0,
-            "tape_length": 0.005,
-        },
-    ),
-    "pinch_pattern of a design": (helix.pinch_pattern, {"actuator": DESIGN, "spacing": 0.02, "handedness": None}),
+    "pinch_pattern": (helix.pinch_pattern, {"design": DESIGN, "spacing": 0.02, "method": "tape"}),
     "locate": (PLAN.locate, {"arc": 0.1}),
     "discrete_centre_line": (helix.discrete_centre_line, {"pattern": PLAN, "samples": 2}),
     "shape_error": (helix.shape_error, {"pattern": PLAN, "samples": 2}),
-    "design_grasp": (helix.design_grasp, {"object_radius": 0.05, "squeeze": 0.0, **DESIGNED, **LIMITED}),
-    "design_antenna": (helix.design_antenna, {"radius": 0.07, **DESIGNED, **LIMITED}),
-    "HelixDesign": (_whole_design, {**ACTUATOR, "turns": 3.0, "wish": None, "contraction_limits": None, "angle_limits": None}),
+    "design_grasp": (helix.design_grasp, {"object_radius": 0.05, "squeeze": 0.0, **DESIGNED}),
+    "design_antenna": (helix.design_antenna, {"radius": 0.07, **DESIGNED}),
+    "HelixDesign": (_whole_design, {**ACTUATOR, "turns": 3.0, "wish": None}),
     "Wish": (_wish, {"purpose": "grasp", "path": "inner", "radius": 0.05, "turn_height": 0.1, "squeeze": 0.0}),
     "ActuatorTable": (
         helix.ActuatorTable,
-        {"pressure": [0.0, 1e4, 2e4], "contraction": [0.5, 0.6, 0.7], "interpolation": "pchip"},
+        {"pressure": [0.0, 1e4, 2e4], "contraction": [0.5, 0.6, 0.7]},
     ),
-    "contraction_at": (lambda pressure: [table.contraction_at(pressure) for table in TABLES], {"pressure": 1e4}),
-    "pressure_for": (lambda contraction: [table.pressure_for(contraction) for table in TABLES], {"contraction": 0.65}),
+    "contraction_at": (TABLE.contraction_at, {"pressure": 1e4}),
+    "pressure_for": (TABLE.pressure_for, {"contraction": 0.65}),
     "bent_tube": (
         helix.bent_tube,
-        {**ACTUATOR, "length": 0.1, "handedness": "right", "samples": 3, "tolerance": 1e-4, "breakpoints": ()},
+        {**ACTUATOR, "length": 0.1, "handedness": "right", "samples": 3},
     ),
     "quintic": (sr.quintic, {"share": 0.5}),
     "waypoints": (sr.waypoints, {"positions": [[0.0, 0.0, 0.0], [1.0, 1.0, 1.0]], "times": [0.0, 1.0]}),

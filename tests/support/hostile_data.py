@@ -140,12 +140,12 @@ def design_corpus() -> list[bytes]:
     grasp = design_grasp(0.020, 0.080, diameter=0.0331, turns=1.5)
     plain = HelixDesign(grasp.contraction, grasp.angle, grasp.diameter, grasp.turns)
     with TemporaryDirectory() as folder:
-        return [design.save(Path(folder) / f"{k}.json").read_bytes() for k, design in enumerate((grasp, plain))]
+        return [sr.save_result(design, Path(folder) / f"{k}.json").read_bytes() for k, design in enumerate((grasp, plain))]
 
 
 def read_design(file: Path) -> None:
     """A design of a helix."""
-    design = HelixDesign.load(file)
+    design = sr.load_result(file)
     finite(design.tube_length, design.contraction, design.angle)
 
 
@@ -334,6 +334,7 @@ def results() -> dict[str, Any]:
         "cross_validation": sr.CrossValidation(
             {"k": ("stiffness",), "all": ("stiffness", "base.position.x")}, ("a", "b"), np.array([[2.0, 3.0], [1.0, 1.5]]), "m"
         ),
+        "helix_design": design_grasp(0.020, 0.080, diameter=0.0331, turns=1.5),
     }
 
 
@@ -378,6 +379,9 @@ def read_result(file: Path) -> None:
         return
     if isinstance(result, sr.CrossValidation):
         finite(result.errors, result.means, result.standard_errors)
+        return
+    if isinstance(result, HelixDesign):
+        finite(result.tube_length, result.contraction, result.angle)
         return
     if isinstance(result, tuple):
         finite(*(branch.forces for branch in result), *(branch.energy for branch in result))
