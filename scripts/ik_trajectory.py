@@ -184,7 +184,7 @@ def summarise(
         "tip_error_paper_m": None if paper is None else float(paper.tip_error.max()),
         "paper_gain_1_s": gain,
         "largest_moment_N_m": moments,
-        "wrinkling_margin": trajectory.wrinkling_margin,
+        "wrinkling_margin": trajectory.least_margin("wrinkling_margins"),
         "pressure_Pa": trajectory.model.spring_groups[0].pressure,
         "required_pressure_Pa": trajectory.required_pressure,
         "required_tabulated_pressure_Pa": inflated_beam.required_tabulated_pressure(max(moments), radius),

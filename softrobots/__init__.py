@@ -34,7 +34,7 @@ from softrobots.core.result_file import load_result, save_csv, save_result
 from softrobots.core.suspicion import SuspiciousInputWarning
 from softrobots.description.composition import mount
 from softrobots.dynamics.controllers import PD, ClosedLoop
-from softrobots.dynamics.damping import damping_time_from_decrement, measured_decay
+from softrobots.dynamics.damping import damping_time_from_decrement
 from softrobots.dynamics.input_shaping import InputShaper, ShapedTrajectory, input_shaper, residual_vibration, shape_input
 from softrobots.dynamics.linear_model import LinearModel, linearize
 from softrobots.dynamics.motion import Motion, MotionState
@@ -174,7 +174,6 @@ __all__ = [
     "load_model",
     "load_result",
     "locate_contact",
-    "measured_decay",
     "mount",
     "plot",
     "post_buckling_branches",

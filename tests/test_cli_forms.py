@@ -139,50 +139,6 @@ def test_pcc_jacobian_is_the_derivative_of_the_pose(frame: str, answer) -> None:
     assert set(exact["units"]["jacobian"].split()) >= {"m/m", "rad/m"}
 
 
-@pytest.mark.study
-@pytest.mark.parametrize(
-    "options",
-    [
-        [],
-        ["--direction", "1", "0", "1"],
-        ["--azimuths", "0", "1.6", "3.1", "4.7", "--distance", "0.03", "0.04"],
-        ["--segments", "3", "--rest", "0.4"],
-        ["--rest", "0.5", "0.5", "0.3", "--offsets", "0", "0.2", "-0.4"],
-        ["--start", *LENGTHS],
-    ],
-)
-def test_pcc_reach_puts_the_tip_there(options: list[str], answer) -> None:
-    target = (0.44957382, -0.31544214, 0.84384418)
-    found = answer("pcc", "reach", *words_of(target), *options)
-    assert found["error"] <= 1e-9  # tolerance of the search
-    assert np.linalg.norm(np.subtract(found["tip_position"], target)) <= 1e-9
-    # The closed form of the commanded lengths agrees: the command forward is another path than the search.
-    shared = [word for name in ("--azimuths", "--distance", "--offsets") for word in _option(options, name)]
-    again = answer("pcc", "forward", *words_of(found["muscle_lengths"]), *shared)
-    assert np.linalg.norm(np.subtract(again["tip_position"], target)) <= 1e-9
-    assert np.abs(found["muscle_extension"]).max() <= 0.15 + 1e-12
-    if "--direction" in options:
-        assert np.allclose(found["tip_direction"], np.array((1, 0, 1)) / math.sqrt(2), rtol=0.0, atol=1e-8)
-    if "--start" in options:  # they reach it already, to the digits printed: nothing moves
-        assert np.allclose(np.ravel(found["muscle_lengths"]), np.array(LENGTHS, dtype=float), rtol=0.0, atol=1e-8)
-
-
-def _option(words: list[str], name: str) -> list[str]:
-    """An option with its numbers, if it is there."""
-    if name not in words:
-        return []
-    place = words.index(name)
-    rest = list(words[place + 1 :])
-    end = next((number for number, word in enumerate(rest) if word.startswith("--")), len(rest))
-    return [name, *rest[:end]]
-
-
-def test_pcc_reach_says_what_is_out_of_reach(told) -> None:
-    status, out, err = told("pcc", "reach", "0", "0.1", "2.5", "--segments", "1")
-    assert (status, out) == (1, "")
-    assert "cannot reach [0.0, 0.1, 2.5] m" in err
-
-
 def test_pcc_fits_more_than_three_muscles_within_a_tolerance(told) -> None:
     words = ["pcc", "forward", "0.5", "0.52", "0.501", "0.48", "--azimuths", "0", "1.5708", "3.1416", "-1.5708"]
     status, out, err = told(*words)
@@ -213,16 +169,6 @@ def test_pcc_fits_more_than_three_muscles_within_a_tolerance(told) -> None:
         (["inverse", "--arc", "0.5", "-1", "0"], "--arc must"),
         (["inverse", "--arc", "0.5", "1", "inf"], "--arc must"),
         (["inverse", "--arc", "0.01", "3", "0"], "positive lengths"),
-        (["reach", "0", "0", "nan"], "target"),
-        (["reach", "0", "0", "1", "--segments", "0"], "--segments must be at least 1"),
-        (["reach", "0", "0", "1", "--segments", "51"], "at most 300 joints, not 306"),
-        (["reach", "0", "0", "1", "--segments", "2", "--rest", "0.5", "0.5", "0.5"], "one for each of the 2 segments"),
-        (["reach", "0", "0", "1", "--start", "0.5"], "--start must be an array of shape (6,)"),
-        (["reach", "0", "0", "1", "--start", *["0.7"] * 6], "within the motor limits"),
-        (["reach", "0", "0", "1", "--contraction", "1"], "--contraction must be above 0, below 1"),
-        (["reach", "0", "0", "1", "--extension", "-0.1"], "--extension"),
-        (["reach", "0", "0", "1", "--direction", "0", "0", "0"], "--direction must"),
-        (["reach", "0", "0.1", "0.4", "--segments", "1", "--direction", "0", "0", "1"], "--direction"),
     ],
 )
 def test_pcc_refuses(words: list[str], message: str, told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -243,7 +189,6 @@ def test_pcc_refuses(words: list[str], message: str, told, tmp_path: Path, monke
         (["pcc", "inverse", "--arc", "1", "2"], "expected 3 arguments"),
         (["pcc", "forward", "long"], "invalid float value: 'long'"),
         (["pcc", "forward", "1", "--frame", "world"], "invalid choice: 'world'"),
-        (["pcc", "reach", "1", "2"], "required: Z"),
         (["helix"], "required: FORM"),
         (["helix", "inverse", "--outer-radius", "1", "--inner-radius", "0.5"], "--pitch --turn-height is required"),
         (["helix", "inverse", "--outer-radius", "1", "--pitch", "1"], "--inner-radius"),
@@ -441,7 +386,6 @@ def test_helix_refuses(words: list[str], message: str, told, tmp_path: Path, mon
     "words",
     [
         ["pcc", "forward", *LENGTHS, "--jacobian"],
-        ["pcc", "reach", "0.3", "0.2", "0.85"],
         ["helix", "forward"],
         ["helix", "forward", "--contraction", "1"],  # a straight tube has no neighbouring turns
         ["helix", "design", "--antenna", "0.07", "0.18", "3"],
@@ -467,8 +411,6 @@ def test_defaults_are_those_of_the_robots(answer) -> None:
     bent = sr.solve_equilibrium(model, [float(word) for word in LENGTHS])  # weightless: arcs of constant curvature
     found = answer("pcc", "forward", *LENGTHS)
     assert np.allclose(found["tip_position"], bent.tip_position, rtol=0.0, atol=1e-9)
-    straight = answer("pcc", "reach", "0", "0", repr(sum(arm.segment_lengths)))
-    assert np.allclose(straight["muscle_lengths"], 0.524, rtol=0.0, atol=1e-9)
 
 
 # --- softrobots bench

@@ -35,15 +35,13 @@ def test_a_release_is_that_of_the_library(arm: sr.SoftModel, tmp_path: Path, cap
     words += ["--release", "0", "10", "-15", "--damping-time", "0.01"]
     drawn = ["plot", "energies", "strobe"]
     pictures = [word for name in drawn for word in (f"--{name}", str(tmp_path / f"{name}.png"))]
-    page = ["--page", str(tmp_path / "a.html")]
-    assert main([*words, "-o", str(file), *pictures, *page]) == 0
+    assert main([*words, "-o", str(file), *pictures]) == 0
     out, err = capsys.readouterr()
-    for told in ("load on tip", "tip error", "energy balance", "10, of 0.01 to 0.01 s", "spring_2_up", "a.html: written"):
+    for told in ("load on tip", "tip error", "energy balance", "10, of 0.01 to 0.01 s", "spring_2_up"):
         assert told in out
     assert "motion" in err  # the bar
     same(want, sr.load_result(file))
     assert all((tmp_path / f"{name}.png").stat().st_size > 10_000 for name in drawn)
-    assert "set_animation" not in (tmp_path / "a.html").read_text()[:100]
     assert main([*words, "-o", str(tmp_path / "m.csv")]) == 0
     assert (tmp_path / "m.csv").read_text().startswith("time [s],motor_1 [rad]")
     assert main([*words, "-o", str(file)]) == 2  # it is there
@@ -133,7 +131,6 @@ def test_a_saved_motion_is_shown_at_any_speed(arm: sr.SoftModel, tmp_path: Path,
         ("--duration 1 --motors 1", "(it has shape (1,)): motor_1 [rad]"),
         ("--duration 1 --plot a.jpg", "ends in .png"),
         ("--duration 1 --energies a.jpg", "ends in .png"),
-        ("--duration 1 --page a.txt", "ends in .html"),
         ("--duration 1 -o a.txt", "ends in .npz or .json or .csv"),
         ("--trajectory bad.csv", "t, motor_1, motor_2, motor_3 are required"),
         ("--trajectory one.csv", "at least two are required"),

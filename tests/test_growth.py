@@ -110,7 +110,7 @@ def test_only_sections_of_a_helical_tube_grow() -> None:
 
 
 def test_frames_of_the_growth_begin_short_and_end_at_rest(tube: sr.HelixTube, model: sr.SoftModel) -> None:
-    frames = growth_frames(tube, 4.0, 0.1, 0.25)
+    frames = growth_frames(tube, 4.0)
     lengths = [frame.q_springs.reshape(-1, 4)[:, 3].sum() for frame in frames]
     numbers = [frame.number for frame in frames]
     assert numbers[0] == 0
@@ -118,18 +118,12 @@ def test_frames_of_the_growth_begin_short_and_end_at_rest(tube: sr.HelixTube, mo
     growing = np.array(lengths)[np.array(numbers) <= 90]  # a quarter of the time is left for the whole tube
     assert np.all(np.diff(growing) > 0.0)
     assert np.allclose(frames[-1].q_springs, model.rest, rtol=0.0, atol=1e-12)
-    for hold in (-0.1, 1.0):
-        with pytest.raises(sr.ParameterError, match="hold"):
-            growth_frames(tube, 4.0, 0.1, hold)
-    for front in (-1.0, "a", [1.0], np.nan):
-        with pytest.raises(sr.ParameterError, match="front"):
-            growth_frames(tube, 4.0, front, 0.25)  # type: ignore[arg-type]
 
 
-@pytest.mark.parametrize(("length", "front"), [(0.03, 0.1), (0.2, 0.1), (1.0, 5.0)])
-def test_the_helix_is_formed_in_the_last_frame_however_long_the_front(length: float, front: float) -> None:
+@pytest.mark.parametrize("length", [0.03, 0.2, 1.0])
+def test_the_helix_is_formed_in_the_last_frame_however_short_the_tube(length: float) -> None:
     tube = sr.HelixTube(length=length, elastic_sections=12)
-    last = growth_frames(tube, 4.0, front, 0.25)[-1]
+    last = growth_frames(tube, 4.0)[-1]
     strains = last.q_springs.reshape(-1, 4) / (tube.centre_length / 12)
     assert np.allclose(strains[:, 1:3], tube.strains[1:3], rtol=1e-12)
     assert last.grown == 1.0
@@ -144,8 +138,6 @@ def test_the_page_says_what_it_shows_after_the_growth(tube: sr.HelixTube, model:
         page = viewer.html()
         assert "wrinkling moment left" in page
         assert "the whole tube" not in page
-        viewer.show_configuration(model.configuration((), model.rest))
-        assert "wrinkling moment left" not in viewer.html()
 
 
 @pytest.mark.study

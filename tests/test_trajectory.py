@@ -86,7 +86,9 @@ def test_moments_pressure_and_margin(arm: sr.SoftModel) -> None:
     assert found.required_pressure == pytest.approx(
         ((4 * moments / (np.pi * 0.055) - axial) / (np.pi * 0.055**2)).max(), rel=1e-12
     )
-    assert found.wrinkling_margin == pytest.approx((1 - moments / (np.pi / 4 * 0.055 * tension)).min(), rel=1e-12)
+    assert found.least_margin("wrinkling_margins") == pytest.approx(
+        (1 - moments / (np.pi / 4 * 0.055 * tension)).min(), rel=1e-12
+    )
     assert sr.inflated_beam.required_tabulated_pressure(largest[0], 0.055) == 50e3
     assert [state.wrinkled for state in found.equilibria] == [False] * 101
 
@@ -94,7 +96,7 @@ def test_moments_pressure_and_margin(arm: sr.SoftModel) -> None:
 def test_a_robot_without_inflated_links_has_no_moments(arm: sr.SoftModel) -> None:
     plain = sr.load_model(arm.urdf, springs=dict.fromkeys(arm.spring_joints) | {"spring_1_up": 100.0}, motors=arm.motor_joints)
     found = sr.follow_trajectory(plain, PATH.positions[:5], FORCE)
-    assert (found.link_moments, found.required_pressure, found.wrinkling_margin) == (None, None, None)
+    assert (found.link_moments, found.required_pressure, found.least_margin("wrinkling_margins")) == (None, None, None)
 
 
 @pytest.mark.study

@@ -230,9 +230,7 @@ def test_bad_input_is_refused(arm: sr.SoftModel, odd_arm: sr.SoftModel, trajecto
             (lambda: viewer.show(None), "an Equilibrium"),
             (lambda: viewer.animate(foreign), "a Trajectory"),
             (lambda: viewer.animate(trajectory, duration=0.0), "duration"),
-            (lambda: viewer.animate(trajectory, repetitions=-3), "repetitions"),
             (lambda: viewer.trace([(0, 0)]), "points"),
-            (lambda: viewer.show_configuration(np.zeros(3)), "q = "),
             (lambda: view(arm, "x"), "an Equilibrium"),
         ):
             with pytest.raises(sr.ParameterError, match=message):

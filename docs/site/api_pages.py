@@ -102,7 +102,7 @@ PAGES = {
         (
             *_top("simulate", "Motion", "MotionState", "dynamics.motion.MotionEnergy"),
             *_top("vibration_modes", "VibrationModes", "dynamics.vibration.ModeSwing", "linearize", "LinearModel"),
-            *_top("ring_down", "RingDown", "damping_time_from_decrement", "measured_decay", "dynamics.damping.Decay"),
+            *_top("ring_down", "RingDown", "damping_time_from_decrement"),
             *_top("PD", "ClosedLoop"),
             *_top("shape_input", "ShapedTrajectory", "input_shaper", "InputShaper", "residual_vibration"),
         ),

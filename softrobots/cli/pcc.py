@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from softrobots import constant_curvature
-from softrobots.cli.options.command_line import add_numbers, refuse_too_large
+from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.reports.answers import Fact, add_json, answer_of, print_answer
 from softrobots.constant_curvature import Arc
 from softrobots.constant_curvature.poses import FRAMES
@@ -17,9 +17,7 @@ from softrobots.core.checks import FloatArray, positive_array
 from softrobots.core.errors import ParameterError
 from softrobots.core.summary import aligned
 from softrobots.core.suspicion import stretched_too_far
-from softrobots.model.loader import load_model
 from softrobots.robots import PccArm
-from softrobots.statics.inverse_kinematics import solve_ik
 
 REST = float(PccArm.segment_lengths[0])
 """Default rest length of a segment [m]."""
@@ -29,16 +27,15 @@ _EXAMPLES = """examples:
   softrobots pcc forward 0.50 0.53 0.55 --distance 0.03 --jacobian
   softrobots pcc forward 0.5 0.52 0.5 0.48 --azimuths 0 1.5708 3.1416 -1.5708     one segment of four muscles
   softrobots pcc inverse --arc 0.52 0.7 -0.4 --arc 0.53 0.5 1.2    arcs -> muscle lengths
-  softrobots pcc reach 0.45 -0.32 0.84                             position of the tip -> muscle lengths, without load
 
 All lengths in m, all angles in rad. Defaults are those of the robot pcc_arm. These forms know no load and no weight;
-`softrobots solve pcc_arm` and `softrobots ik pcc_arm` do.
+`softrobots solve pcc_arm` and `softrobots ik pcc_arm`, which finds the lengths for a position of the tip, do.
 """
 
 _JSON = """With --json: one object with these names, and their units under "units": muscle_lengths (segment, muscle),
 muscle_extension (length over rest length, less 1), muscle_residual (segment), arc_length, arc_bending, arc_azimuth (segment),
 transforms (segment, 4, 4; end of a segment to base), tip_position, tip_direction (its z axis), jacobian (6, muscles; of
-the tip, linear rows first; null without --jacobian), target and error with reach, and frame.
+the tip, linear rows first; null without --jacobian), and frame.
 """
 
 
@@ -65,19 +62,6 @@ def add_parser(subparsers: Any) -> None:
     )
     add_numbers(inverse, "--arc", "LENGTH BENDING AZIMUTH", help_text, action="append", required=True, dest="arcs")
 
-    reach = _form(forms, "reach", _reach, "position of the tip -> muscle lengths, without load")
-    reach.description = f"{reach.description} The lengths that differ least from --start, of segments that bend by less than "
-    reach.description += "170 degrees. Exit status 1 if the tip cannot get there."
-    for axis in "xyz":
-        add_numbers(reach, axis, axis.upper(), f"position of the tip along {axis} [m]")
-    help_text = f"number of segments (as many as --rest has, else {len(PccArm.segment_lengths)})"
-    reach.add_argument("--segments", type=int, metavar="N", help=help_text)
-    add_numbers(reach, "--direction", "X Y Z", "direction in which the tip points, any length but zero [-] (any direction)")
-    add_numbers(reach, "--start", "L", "muscle lengths to change least, as in forward [m] (rest)", nargs="+")
-    for name, default in (("contraction", PccArm.muscle_contraction), ("extension", PccArm.muscle_extension)):
-        help_text = f"largest {name} of a muscle, relative to its rest length [-] (%(default)s)"
-        add_numbers(reach, f"--{name}", "C", help_text, default=default)
-
 
 def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summary: str) -> argparse.ArgumentParser:
     """Add a form, with the options that all of them have."""
@@ -93,12 +77,9 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
     add_numbers(parser, "--offsets", "A", help_text, nargs="+")
     help_text = f"rest length of a segment and its muscles, one number or one per segment [m] ({REST})"
     add_numbers(parser, "--rest", "L", help_text, nargs="+")
-    parser.set_defaults(run=run, frame=FRAMES[0])
-    if name != "reach":
-        help_text = (
-            "frame at the end of a segment: without torsion, or turning with the bending plane as the paper's (%(default)s)"
-        )
-        parser.add_argument("--frame", choices=FRAMES, default=FRAMES[0], help=help_text)
+    parser.set_defaults(run=run)
+    help_text = "frame at the end of a segment: without torsion, or turning with the bending plane as the paper's (%(default)s)"
+    parser.add_argument("--frame", choices=FRAMES, default=FRAMES[0], help=help_text)
     help_text = "also the Jacobian of the tip with respect to muscle lengths [m/m, rad/m] (left out)"
     parser.add_argument("--jacobian", action="store_true", help=help_text)
     add_json(parser)
@@ -129,37 +110,6 @@ def _inverse(arguments: argparse.Namespace) -> None:
     _answer(arguments, lengths, arcs, distance)
 
 
-def _reach(arguments: argparse.Namespace) -> None:
-    """Position of the tip to muscle lengths: the inverse kinematics of the arm, weightless and with one section a segment."""
-    rest = arguments.rest or [REST]
-    count = arguments.segments
-    if count is None:
-        count = len(rest) if len(rest) > 1 else len(PccArm.segment_lengths)
-    if count < 1:
-        raise ParameterError("--segments", count, "at least 1")
-    distance = _per_segment("--distance", arguments.distance, count)
-    robot = PccArm(
-        segment_lengths=tuple(_per_segment("--rest", rest, count).tolist()),
-        muscle_azimuths=tuple(arguments.azimuths),
-        muscle_distance=tuple(distance.tolist()),
-        muscle_contraction=arguments.contraction,
-        muscle_extension=arguments.extension,
-        elastic_sections=1,
-        offset=PccArm.offset if arguments.offsets is None else tuple(arguments.offsets),
-    )
-    refuse_too_large(robot, "--segments", count)
-    target = (arguments.x, arguments.y, arguments.z)
-    solution = solve_ik(load_model(robot), target, orientation=arguments.direction, q_motors0=arguments.start)
-    lengths = solution.q_motors.reshape(count, -1)
-    arcs = constant_curvature.arc_from_muscles(lengths, distance, arguments.azimuths)
-    tip = constant_curvature.chain_transform(arcs, arguments.offsets)[:3, 3]
-    facts = [
-        Fact("target", solution.target, "m", "target"),
-        Fact("error", float(np.linalg.norm(tip - solution.target)), "m", "distance of the tip from it"),
-    ]
-    _answer(arguments, lengths, arcs, distance, facts)
-
-
 def _per_segment(name: str, values: Sequence[float], count: int) -> FloatArray:
     """One positive number for each segment, from one for all or one for each."""
     if len(values) not in (1, count):
@@ -167,9 +117,7 @@ def _per_segment(name: str, values: Sequence[float], count: int) -> FloatArray:
     return np.array(np.broadcast_to(positive_array(name, values, "m"), (count,)))
 
 
-def _answer(
-    arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, distance: FloatArray, further: Sequence[Fact] = ()
-) -> None:
+def _answer(arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, distance: FloatArray) -> None:
     """Print the facts of the segments.
 
     Args:
@@ -177,7 +125,6 @@ def _answer(
         lengths: Muscle lengths, shape (segments, muscles) [m].
         arcs: Their arcs, shape (segments,).
         distance: Distance of the muscles from the backbone, shape (segments,) [m].
-        further: Facts of one form alone.
     """
     azimuths, offsets, frame = arguments.azimuths, arguments.offsets, arguments.frame
     rest = _per_segment("--rest", arguments.rest or [REST], len(lengths))
@@ -199,7 +146,6 @@ def _answer(
         Fact("tip_position", transforms[-1, :3, 3], "m", "tip"),
         Fact("tip_direction", transforms[-1, :3, 2], "-", "tip points along"),
         Fact("jacobian", jacobian, unit, "Jacobian"),
-        *further,
         Fact("frame", frame, "", "frame"),
     ]
     print_answer(arguments, answer_of(facts), _lines(facts))
@@ -221,8 +167,6 @@ def _lines(facts: list[Fact]) -> list[str]:
     if values["jacobian"] is not None:
         lines += ["", "Jacobian of the tip, a column a muscle: linear [m/m], then angular [rad/m]"]
         lines += _matrix(values["jacobian"])
-    if "target" in values:
-        lines += ["", f"misses the target by {values['error']:.1e} m"]
     worst = float(np.max(values["muscle_residual"]))
     if worst > 1e-12:  # three muscles always fit, up to rounding
         lines += ["", f"the lengths miss those of the arcs by up to {worst:.3g} m"]

@@ -18,7 +18,6 @@ from softrobots.cli.options.output_files import (
     ROS_FORMS,
     add_output,
     add_plot,
-    check_ending,
     check_files,
     check_plot,
     save,
@@ -30,7 +29,6 @@ from softrobots.cli.reports.motion_report import motion_answer
 from softrobots.core.checks import FloatArray, finite_array, positive_number
 from softrobots.core.csv_table import Table, read_table
 from softrobots.core.errors import FileFormatError, NotConverged, ParameterError
-from softrobots.core.files import new_file
 from softrobots.core.result_file import load_result
 from softrobots.core.summary import text_of
 from softrobots.dynamics.motion import Motion
@@ -42,12 +40,12 @@ from softrobots.statics.equilibrium_summary import loaded_robot
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import Trajectory
 from softrobots.view.figures import motions
-from softrobots.view.viewer import Viewer
 
 _EXAMPLES = """examples:
-  softrobots simulate inflatable_arm --duration 2 --gravity --release 0 6 -8 --plot tip.png --page ringing.html
+  softrobots simulate inflatable_arm --duration 2 --gravity --release 0 6 -8 --plot tip.png -o ringing.npz
   softrobots simulate inflatable_arm --trajectory followed.npz --force 0 10 -15 --gravity --strobe moves.png
   softrobots simulate helix_tube --duration 3 --force-table gust.csv --damping-time 0.01 --json
+  softrobots view --result ringing.npz --html ringing.html        an animated page of a motion that is saved
 """
 
 _PICTURES: dict[str, Callable[[Motion], Any]] = {
@@ -102,8 +100,6 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--energies", type=Path, metavar="FILE.png", help=help_text)
     help_text = "draw the robot at several times, later ones darker, into this PNG file (none)"
     parser.add_argument("--strobe", type=Path, metavar="FILE.png", help=help_text)
-    help_text = "write an animated page in real time, which works offline (none); `softrobots view` plays at other speeds"
-    parser.add_argument("--page", type=Path, metavar="FILE.html", help=help_text)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -139,10 +135,6 @@ def run(arguments: argparse.Namespace) -> None:
     files = save(arguments, motion)
     for option, draw in _PICTURES.items():
         files += write_plot(arguments, partial(draw, motion), option)
-    if arguments.page is not None:
-        with Viewer(model) as viewer:
-            viewer.animate(motion)
-            files.append(viewer.write_html(arguments.page, title=str(model.pinocchio.name), overwrite=arguments.overwrite))
     lines = text_of([loaded_robot(model, load), *motion.summary_parts()[1:]], None)
     print_answer(arguments, motion_answer(motion, load), lines, files)
     if failure is not None:
@@ -156,9 +148,6 @@ def _check_files(arguments: argparse.Namespace) -> None:
     check_files(arguments, *RESULT_FILES, *ROS_FILES)
     for option in _PICTURES:
         check_plot(arguments, option)
-    if arguments.page is not None:
-        check_ending("--page", arguments.page, ".html")
-        new_file(arguments.page, overwrite=arguments.overwrite)
     if arguments.release is not None and arguments.start is not None:
         raise ParameterError("--release", arguments.release, "given with no --start, because it is one")
     if arguments.tolerance is not None and arguments.time_step is not None:

@@ -13,26 +13,16 @@ into its file as `<dynamics damping>` of each joint, :math:`\beta` times the sti
 from __future__ import annotations
 
 import math
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_number
-from softrobots.dynamics.ring_down import ring_down
+from softrobots.core.checks import FloatArray, non_negative_number, positive_number
 from softrobots.model.assembly import velocity_indices
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.stability import mass_matrix
 
 _SHARING = ((0, 3), (1, 4), (5, 5), (2, 2))  # of the six joints of a section, those of bend_x, bend_y, twist, stretch
-
-
-class Decay(NamedTuple):
-    """Free vibration of one mode that dies away."""
-
-    decrement: float
-    """Logarithmic decrement, `ln(x_n / x_(n+1))` of two peaks one period apart [-]."""
-    frequency: float
-    """Frequency at which it was seen to vibrate [Hz]."""
 
 
 def damping_matrix(
@@ -94,30 +84,6 @@ def damping_time_from_decrement(decrement: Any, frequency: Any) -> float:
     """
     delta, f = non_negative_number("decrement", decrement, "-"), positive_number("frequency", frequency, "Hz")
     return 2.0 * delta / ((4.0 * math.pi**2 + delta**2) * f)
-
-
-def measured_decay(time: Any, signal: Any) -> Decay:
-    """Decrement and frequency of a measured free vibration of one mode, e.g. the tip's height after the robot is plucked.
-
-    `damping_time_from_decrement(*measured_decay(time, signal))` is the damping time. For several modes, several signals or
-    standard deviations see `ring_down`.
-
-    Args:
-        time: Times, ascending, at least 8 that span a period or more, shape (n,) [s].
-        signal: What was measured then, any unit, shape (n,).
-
-    Returns:
-        Decrement and frequency.
-
-    Raises:
-        ParameterError: If shapes differ, times do not ascend, or the signal is constant.
-        NotConverged: If no decaying vibration fits the signal.
-    """
-    t = finite_array("time", time, (None,), "s")
-    found = ring_down(t, finite_array("signal", signal, (len(t),)))
-    ratio = float(found.damping_ratios[0])
-    slow = math.sqrt(1.0 - ratio**2)
-    return Decay(2.0 * math.pi * ratio / slow, float(found.frequencies[0]) * slow)
 
 
 def strain_damping(model: SoftModel, damping_time: float | None = None) -> FloatArray:

@@ -117,11 +117,6 @@ class Equilibrium(Summarised):
         """Pose of the tip, a `pinocchio.SE3` of the caller's own [m]."""
         return frame_placement(self.model, self.q, self.model.tip)
 
-    @property
-    def tip_se3(self) -> Any:
-        """The same as `transform_tip_to_world`."""
-        return self.transform_tip_to_world
-
     @cached_property
     def tip_pose(self) -> FloatArray:
         """Pose of the tip in the world as a homogeneous matrix: rotation, position in the last column, shape (4, 4) [m]."""

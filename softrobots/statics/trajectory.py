@@ -86,11 +86,6 @@ class Trajectory(Summarised):
         return read_only(np.array([equilibrium.tip_position for equilibrium in self.equilibria]))
 
     @cached_property
-    def tip_poses(self) -> FloatArray:
-        """Poses of the loaded tip as homogeneous matrices, shape (n, 4, 4) [m]."""
-        return read_only(np.array([equilibrium.tip_pose for equilibrium in self.equilibria]))
-
-    @cached_property
     def tip_error(self) -> FloatArray:
         """Distance of the loaded tip from its target, shape (n,) [m]."""
         return read_only(np.linalg.norm(self.tip_positions - self.targets, axis=1))
@@ -137,21 +132,6 @@ class Trajectory(Summarised):
     def summary_parts(self) -> list[Part]:
         """Return range and largest load of each motor, and the worst of all waypoints."""
         return trajectory_parts(self)
-
-    @property
-    def wrinkling_margin(self) -> float | None:
-        """Remaining share of the wrinkling moment at the worst waypoint and link [-]; negative: a link wrinkles.
-
-        With the axial forces; None without inflated links.
-
-        Raises:
-            ParameterError: If a link has no pressure, and so no wrinkling moment.
-        """
-        if self.link_moments is None:
-            return None
-        if any(group.pressure == 0.0 for group in self.model.spring_groups):
-            raise ParameterError("pressure", 0.0, "positive in every link, for a wrinkling margin to exist")
-        return min(float(equilibrium.link_limits.wrinkling_margins.min()) for equilibrium in self.equilibria)
 
 
 def follow_trajectory(

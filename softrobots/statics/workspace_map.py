@@ -153,12 +153,6 @@ class WorkspaceMap(Summarised):
             getattr(self, name).setflags(write=False)
 
     @property
-    def reached_load(self) -> FloatArray:
-        """Largest of `loads` up to which the target is reached at every one, shape (...) [N]; -1 if at none."""
-        levels = np.cumprod(self.reached, axis=-1).sum(axis=-1)
-        return np.asarray(np.where(levels > 0, self.loads[levels - 1], -1.0))
-
-    @property
     def wrinkled(self) -> BoolArray:
         """Whether the target is reached with a link that needs more than its own pressure, shape (..., n_loads).
 

@@ -6,7 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_number, non_negative_number, positive_number
+from softrobots.core.checks import FloatArray, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.vibration import ModeSwing
@@ -32,6 +32,8 @@ _MOST_RIGID = 600  # frames of a motion of rigid links
 _MOST_BENDING = 50  # frames of a motion whose body bends; a page has about a megabyte at most
 _SWING_TIME = 2.0  # [s], of a mode: most are too fast to be seen
 _CONTACT_TIME = 6.0  # [s], of a path in contact, whose parameter is no time
+_FRONT = 3.0  # length of a growing tube behind its tip over which the helix forms, over its diameter
+_HELD = 0.25  # share of the time at the end during which the whole tube is shown
 _MOST_FRAMES = 2**31 - 1  # a browser's largest frame number
 
 
@@ -137,24 +139,21 @@ def swing_frames(swing: ModeSwing, seconds: float) -> list[Frame]:
     return [Frame(number, *swing.at(number / total), swing.modes.equilibrium) for number in numbers.tolist()]
 
 
-def growth_frames(tube: HelixTube, seconds: float, front: float, hold: float) -> list[Frame]:
+def growth_frames(tube: HelixTube, seconds: float) -> list[Frame]:
     """Return frames of a tube that grows at constant speed and is then held; see `robots.growth.grown_coordinates`.
 
-    While the tube is held the rest of the helix forms, at the speed of growth, or faster so that it ends in the last frame. The
-    arguments are those of `Viewer.animate_growth`.
+    While the tube is held the rest of the helix forms, at the speed of growth, or faster so that it ends in the last frame.
 
     Raises:
-        ParameterError: If an argument is out of range.
+        ParameterError: If the duration is not positive.
     """
-    if not 0.0 <= finite_number("hold", hold) < 1.0:
-        raise ParameterError("hold", hold, "in [0, 1)")
-    front = non_negative_number("front", front, "m")
+    front = _FRONT * tube.diameter
     numbers, total = _spread(positive_number("duration", seconds, "s"))
-    shares = np.clip(numbers / total / (1.0 - hold), 0.0, 1.0)
+    shares = np.clip(numbers / total / (1.0 - _HELD), 0.0, 1.0)
     # While the tube is held, its last stretch forms in the time that the tip took for it, or in the time that is left.
-    speed = max(tube.length / (1.0 - hold), front / hold if hold > 0.0 else 0.0)
-    formed = np.clip((numbers / total - (1.0 - hold)) * speed, 0.0, front)
-    formed[-1] = front if hold > 0.0 else 0.0
+    speed = max(tube.length / (1.0 - _HELD), front / _HELD)
+    formed = np.clip((numbers / total - (1.0 - _HELD)) * speed, 0.0, front)
+    formed[-1] = front
     motors: FloatArray = np.zeros(0)
     return [
         Frame(number, motors, grown_coordinates(tube, max(share, SHORTEST) * tube.length, front - done).ravel(), None, share)

@@ -173,11 +173,6 @@ class SceneBuilder:
         """Return a robot under a load at given coordinates, with the tension of each muscle, shape (n_muscles,) [N]."""
         return self._scene(Frame(0, q_motors, q_springs, None, load=load, tensions=tensions))
 
-    def chain(self, q: FloatArray) -> Scene:
-        """Return the chain alone at a configuration of Pinocchio, shape (nq,), without load."""
-        poses = self.robot.transforms(q)
-        return Scene(poses, poses, self._reference())
-
     def movement(self, movement: Movement, seconds: float) -> dict[int, Scene]:
         """Return the scenes of an animation by number of frame.
 
@@ -206,13 +201,13 @@ class SceneBuilder:
                     found.append(placed)
         return np.concatenate(found)
 
-    def growth(self, tube: HelixTube, seconds: float, front: float, hold: float) -> dict[int, Scene]:
+    def growth(self, tube: HelixTube, seconds: float) -> dict[int, Scene]:
         """Return the scenes of a growing tube by number of frame; see `growth_frames`.
 
         Raises:
-            ParameterError: If an argument is out of range.
+            ParameterError: If the duration is not positive.
         """
-        return {frame.number: self._scene(frame, 3) for frame in growth_frames(tube, seconds, front, hold)}
+        return {frame.number: self._scene(frame, 3) for frame in growth_frames(tube, seconds)}
 
     def _scene(self, frame: Frame, points: int = 12) -> Scene:
         """The scene of a frame, with a number of points of the body for each section."""

@@ -24,6 +24,8 @@ from softrobots.view.meshcat_page.stage import Stage
 from softrobots.view.scene import SceneBuilder
 from softrobots.view.written_page import WrittenPage
 
+_REPETITIONS = 1000  # of an animation: meshcat mixes start and end when it is scrubbed after the last one
+
 
 class Viewer(WrittenPage):
     """A meshcat page that shows one robot; a context manager that ends its server.
@@ -84,17 +86,6 @@ class Viewer(WrittenPage):
         self._robot.show(self._scenes.loaded(equilibrium))
         self._show_legend()
 
-    def show_configuration(self, q: FloatArray) -> None:
-        """Show the chain alone at a configuration of Pinocchio, shape (nq,), without load.
-
-        Raises:
-            ParameterError: If the shape differs or a number is not finite.
-        """
-        q = finite_array("q", q, (self._model.pinocchio.nq,))
-        self._check_open()
-        self._robot.show(self._scenes.chain(q))
-        self._show_legend()
-
     def trace(self, points: Any) -> None:
         """Draw a path as dots.
 
@@ -129,7 +120,6 @@ class Viewer(WrittenPage):
         *,
         duration: float | None = None,
         speed: float | None = None,
-        repetitions: int = 1000,
     ) -> None:
         """Play a trajectory, a path in contact or a motion as a meshcat animation that starts by itself and can be scrubbed.
 
@@ -141,33 +131,30 @@ class Viewer(WrittenPage):
                 robot.
             duration: Time of the animation [s]; real time by default, 2 s for a mode, 6 s for a path in contact.
             speed: How fast it is played, relative to real time [-], e.g. 0.1; in place of `duration`.
-            repetitions: How often; many, because meshcat mixes start and end when it is scrubbed after the last one.
 
         Raises:
             ParameterError: If it belongs to another robot, duration or speed is not positive, both are given, or a speed for
                 a path in contact.
         """
         seconds = playing_time(self._model, movement, duration, speed)
-        positive_integer("repetitions", repetitions)
         self._check_open()
         scenes = self._scenes.movement(movement, seconds)
         path = movement.tip_position if isinstance(movement, Motion | ModeSwing) else movement.tip_positions
         self._robot.show(next(iter(scenes.values())))
         self._robot.trace(path)
-        self._page.set_animation(self._robot.animate(scenes), play=True, repetitions=repetitions)
+        self._page.set_animation(self._robot.animate(scenes), play=True, repetitions=_REPETITIONS)
         self.look_at(path.mean(axis=0))
         self._show_legend()
 
-    def animate_growth(self, tube: HelixTube, *, duration: float = 8.0, front: float | None = None, hold: float = 0.25) -> None:
+    def animate_growth(self, tube: HelixTube, *, duration: float = 8.0) -> None:
         """Play the growth of a helical tube: it everts at its tip, and the helix forms behind the tip.
 
         Wall that has come out stays where it is; the rest waits inside (dark) and comes forward at twice the speed of the tip.
+        The helix forms over three diameters behind the tip; in the last quarter of the time the whole tube is shown.
 
         Args:
             tube: The tube that the viewer's model was made of, with chain="sections".
             duration: Time of the animation [s].
-            front: Length of tube behind the tip over which the helix forms [m]; three diameters by default, 0: at the tip.
-            hold: Share of the time at the end during which the whole tube is shown, in [0, 1).
 
         Raises:
             ParameterError: If the tube is not that of the viewer's model, or an argument is out of range.
@@ -176,10 +163,10 @@ class Viewer(WrittenPage):
         self._check_open()
         if not isinstance(tube, HelixTube) or tube.urdf() != self._model.urdf:
             raise ParameterError("tube", tube, "the HelixTube that the viewer's model was loaded from")
-        scenes = self._scenes.growth(tube, duration, 3.0 * tube.diameter if front is None else front, hold)
+        scenes = self._scenes.growth(tube, duration)
         whole = self._scenes.relaxed()
         self._robot.show(dataclasses.replace(scenes[0], deformed=whole.deformed, segments=()))
-        self._page.set_animation(self._robot.animate(scenes), play=True, repetitions=1000)
+        self._page.set_animation(self._robot.animate(scenes), play=True, repetitions=_REPETITIONS)
         backbone = np.concatenate([segment.backbone for segment in whole.segments])
         self.look_at(backbone.max(axis=0) + backbone.min(axis=0))
         self._show_legend()

@@ -39,7 +39,7 @@ def summarise(before: sr.Trajectory, after: sr.Trajectory, rigid: sr.Equilibrium
         "effort_limit_N_m": [joints[name].effort for name in model.motor_joints],
         "largest_moment_N_m": None if after.link_moments is None else float(after.link_moments.max()),
         "wrinkling_moment_N_m": min((group.wrinkling_moment for group in model.spring_groups), default=None),
-        "wrinkling_margin": after.wrinkling_margin,
+        "wrinkling_margin": after.least_margin("wrinkling_margins"),
         "all_stable": all(e.stable for e in after.equilibria),
         "within_limits": all(e.within_limits for e in after.equilibria),
     }
