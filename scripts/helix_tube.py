@@ -106,7 +106,6 @@ def run(arguments: argparse.Namespace) -> Path:
         sr.save_result(loaded, folder / "equilibrium.npz")
         sr.save_result(design, folder / "design.json")
         helix.write_template(pattern, folder / "template.svg")
-        helix.write_template_pages(pattern, folder / "template_pages" / "page.svg")
         helix.write_template_table(pattern, folder / "template.csv")
         for name, robot in robots.items():
             write_text(folder / f"{name}.urdf", robot.urdf(), overwrite=False)

@@ -12,8 +12,8 @@ from pathlib import Path
 from typing import Any
 
 from softrobots.cli.options.command_line import exit_status
-from softrobots.view.browser import open_browser
 from studies.gallery.live_pages import LIVE_PAGES
+from studies.shared.browser import open_browser
 
 PAGES = Path(__file__).resolve().parent.parent / "docs" / "pages"
 

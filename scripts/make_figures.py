@@ -21,7 +21,6 @@ from softrobots.cli.options.command_line import exit_status
 from softrobots.core.progress import with_progress
 from softrobots.description.expansion import expand
 from softrobots.inflated_beam import MEAN_STIFFNESS, TABLE_3
-from softrobots.view.browser import take_picture
 from softrobots.view.figures import canvas, equilibria, inflated_link, vibrations
 from studies.contact.pictures import contact_grip, contact_margins, contact_peg_forces
 from studies.gallery import load_plots
@@ -36,6 +35,7 @@ from studies.gallery.your_robot import (
 )
 from studies.motion.pictures import motion_energies, motion_gust, motion_release, motion_tip, motion_turn
 from studies.papers import link_pictures
+from studies.shared.browser import take_picture
 
 DOCS = Path(__file__).resolve().parent.parent / "docs"
 EXAMPLES = DOCS / "examples"

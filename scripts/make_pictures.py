@@ -9,10 +9,10 @@ from pathlib import Path
 
 from softrobots.cli.options.command_line import exit_status
 from softrobots.core.files import new_file
-from softrobots.view.browser import take_picture
 from studies.gallery.live_pages import LIVE_PAGES
 from studies.gallery.moving_picture import take_animation
 from studies.gallery.scenes import EXHIBITS
+from studies.shared.browser import take_picture
 
 PICTURES = (
     "inflatable_arm",

@@ -170,7 +170,7 @@ def bullet(tool: Callable[[str], ModuleType]) -> ModuleType:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[object]:
     """A headless Chromium, one for all tests of a module; Playwright's synchronous API runs once at a time."""
-    from softrobots.view.browser import open_browser
+    from studies.shared.browser import open_browser
 
     with ExitStack() as stack:
         try:

@@ -20,7 +20,7 @@ from scipy.spatial.transform import Rotation
 
 from softrobots import helix
 from softrobots.core.errors import OutputExists, ParameterError
-from softrobots.helix import HelixDesign, Pattern, pinch_pattern, write_template, write_template_pages, write_template_table
+from softrobots.helix import HelixDesign, Pattern, pinch_pattern, write_template, write_template_table
 from tests.support.laws import law
 from tests.support.tables import each_row
 
@@ -337,46 +337,6 @@ def test_numbers_beside_the_pinches_keep_apart(spacing: float, tmp_path: Path):
     apart = np.abs(places[:, None] - places[None]) + 100.0 * np.eye(len(places))[..., None]
     assert np.all((apart[..., 0] > 5.5) | (apart[..., 1] > 2.6))  # three digits are 4.3 mm wide
     assert np.all((places[:, 1] > 0.0) & (places[:, 1] < 1e3 * math.pi * D))
-
-
-# --- Pages
-
-
-@pytest.mark.parametrize(("length", "count"), [(1.2, 6), (0.5, 3), (0.2, 1)])
-def test_pages_cover_the_tube_and_meet_at_the_joins(length: float, count: int, tmp_path: Path):
-    plan = planned((*REFERENCE[:3], length), 0.02)
-    paths = write_template_pages(plan, tmp_path / "tube.svg")
-    assert len(paths) == count  # of 0.25 m, of which 0.02 m are on the next one, too
-    assert [path.name for path in paths] == [f"tube-{n}.svg" for n in range(1, len(paths) + 1)]
-    covered, joins, numbers = 0.0, [], set()
-    for path in paths:
-        root = read(path)
-        (clip,) = next(iter(root.iter(SVG + "clipPath")))
-        start, shown = float(clip.attrib["x"]), float(clip.attrib["width"])
-        left, _ = (float(number) for number in by_id(root, "sheet").attrib["transform"][len("translate(") : -1].split())
-        assert left + start == pytest.approx(18.0, abs=MM)  # what is shown begins at the margin
-        assert shown <= 250.0 + MM
-        if covered:
-            assert covered - start == pytest.approx(20.0, abs=MM)
-        covered = start + shown
-        joins.append([float(join.attrib["data-x"]) for join in found(root, "join")])
-        assert all(start < join < covered for join in joins[-1])
-        numbers |= {int(group.attrib["data-number"]) for group in found(root, "pinch")}
-    assert covered == pytest.approx(1e3 * length, abs=MM)
-    assert numbers == set(range(1, plan.count + 1))
-    for before, after in itertools.pairwise(joins):
-        assert before[-1] == after[0]
-    assert [len(join) for join in joins] == ([0] if len(paths) == 1 else [1, *[2] * (len(paths) - 2), 1])
-
-
-def test_a_page_shows_the_same_marks_as_the_whole_sheet(tmp_path: Path):
-    plan = planned(REFERENCE, 0.02, hand="left")
-    whole = read(write_template(plan, tmp_path / "whole.svg"))
-    page = read(write_template_pages(plan, tmp_path / "tube")[2])  # pages are SVG, whatever the name
-    shared = found(page, "pinch")
-    assert len(shared) > 10
-    for group in shared:
-        assert ET.tostring(group).split() == ET.tostring(by_id(whole, group.attrib["id"])).split()
 
 
 # --- The table
@@ -697,32 +657,21 @@ def test_a_shape_error_of_nothing_is_refused(call: Callable[..., Any], arguments
         call(*arguments)
 
 
-@each_row("path", ["", "/", 3])
-def test_bad_paths_are_refused_before_anything_is_written(path: Any, tmp_path: Path):
-    with pytest.raises(ParameterError, match="path"):
-        write_template_pages(planned(REFERENCE, 0.02), path)
-
-
 @pytest.mark.parametrize(("size", "length"), [(1e-4, 0.01), (20.0, 100.0), (1.0, 300.0)])
 def test_a_tube_that_no_bench_holds_is_not_drawn(size: float, length: float, tmp_path: Path):
     plan = planned((0.66, 0.1, size, length), size)
-    for draw in (partial(write_template, plan), partial(write_template_pages, plan)):
-        with pytest.raises(ParameterError):
-            draw(tmp_path / "tube.svg")
+    with pytest.raises(ParameterError):
+        write_template(plan, tmp_path / "tube.svg")
 
 
 def test_nothing_is_overwritten_unless_told(tmp_path: Path):
     plan = planned(REFERENCE, 0.02)
-    files = ((write_template, "a.svg"), (write_template_table, "a.csv"), (write_template_pages, "p.svg"))
+    files = ((write_template, "a.svg"), (write_template_table, "a.csv"))
     for write, name in ((partial(function, plan), name) for function, name in files):
         write(tmp_path / name)
         with pytest.raises(OutputExists):
             write(tmp_path / name)
         write(tmp_path / name, overwrite=True)
-    (tmp_path / "q-3.svg").write_text("mine")
-    with pytest.raises(OutputExists):
-        write_template_pages(plan, tmp_path / "q.svg")
-    assert [path.name for path in tmp_path.glob("q*")] == ["q-3.svg"]  # not one page was written
 
 
 def test_arrays_of_a_pattern_are_read_only():

@@ -17,7 +17,7 @@ import softrobots as sr
 from softrobots.compiled.drivers import intrinsics
 from softrobots.compiled.statuses import Status
 from softrobots.compiled.translate.javascript import to_javascript
-from softrobots.view.browser import open_browser
+from studies.shared.browser import open_browser
 from tests.support.laws import law
 
 ROBOTS: dict[str, tuple[Any, float, float]] = {

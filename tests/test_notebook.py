@@ -15,7 +15,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.statics.kinematics import frame_placement
-from softrobots.view.browser import find_chromium, open_browser, show_share
+from studies.shared.browser import find_chromium, open_browser, show_share
 from tests.conftest import CHECKOUT, missing
 from tests.support.pictures import coloured, pixels
 

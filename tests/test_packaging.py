@@ -15,8 +15,8 @@ from pathlib import Path
 import pytest
 
 import softrobots as sr
-from softrobots.view.browser import open_browser
 from softrobots.view.figures import canvas
+from studies.shared.browser import open_browser
 from tests.conftest import CHECKOUT
 
 PACKAGE = CHECKOUT / "softrobots"

@@ -14,8 +14,8 @@ from hypothesis import strategies as st
 
 import softrobots as sr
 from softrobots.description.third_party import robot_file
-from softrobots.view.browser import show_share
 from softrobots.view.camera import narrowest, whole_view
+from studies.shared.browser import show_share
 
 WINDOWS = (1200, 500), (800, 600), (380, 760)
 """Wide, as a screen, and as a phone [px]."""

@@ -15,14 +15,14 @@ import pytest
 
 import softrobots as sr
 from softrobots.robots import HelixTube
-from softrobots.view import browser as view_browser
-from softrobots.view.browser import show_share
 from softrobots.view.meshcat_page.page_commands import RESOLUTION, packed, read_page, tidied
 from softrobots.view.meshcat_page.page_text import page_text
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.viewer import view
 from studies.gallery.moving_picture import take_animation
 from studies.gallery.scenes import EXHIBITS
+from studies.shared import browser as view_browser
+from studies.shared.browser import show_share
 from tests.conftest import CHECKOUT
 from tests.support.packed_pages import scene_of, unpacked
 from tests.support.scripts import run_script

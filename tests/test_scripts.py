@@ -189,7 +189,7 @@ def test_scripts_refuse_bad_arguments(name: str, arguments: list[str], message: 
 def test_make_pictures_photographs_the_arm(tmp_path: Path, capsys: pytest.CaptureFixture) -> None:
     from PIL import Image
 
-    from softrobots.view.browser import find_chromium
+    from studies.shared.browser import find_chromium
     from tests.conftest import missing
 
     try:

@@ -23,8 +23,8 @@ import pytest
 import softrobots as sr
 from softrobots.cli.main import main
 from softrobots.view import animation_frames, slider_page
-from softrobots.view.browser import show_share
 from softrobots.view.live.loop import state_line
+from studies.shared.browser import show_share
 from tests.conftest import PATIENCE
 from tests.support.pictures import coloured, listening, pixels
 from tests.support.tables import each_row
@@ -280,23 +280,14 @@ def test_a_saved_result_becomes_a_page(arm: sr.SoftModel, tmp_path: Path, capsys
 
 
 @pytest.mark.study
-def test_a_tube_grows_and_a_picture_is_taken_where_it_is_told(
+def test_a_page_of_a_tube_that_grows_is_written(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture
 ) -> None:
-    taken = []
     monkeypatch.setattr(animation_frames, "_MOST_BODIES", 6)  # of 60: a lighter page
-    monkeypatch.setattr("softrobots.cli.view.find_chromium", lambda: "chromium")
-    monkeypatch.setattr(
-        "softrobots.cli.view.take_picture",
-        lambda page, png, share: taken.append((Path(page).read_text(encoding="utf-8"), Path(png), share)),
-    )
-    picture = tmp_path / "grown.png"
-    words = ["view", "helix_tube", "--set", "elastic_sections=6", "--growth", "--picture", str(picture), "--at", "0.75"]
-    assert main(words) == 0
-    page, png, share = taken[0]
-    assert "wall that has not come out" in page
-    assert (png, share) == (picture, 0.75)
-    assert capsys.readouterr().out.splitlines()[-1] == f"{picture}: written"
+    page = tmp_path / "grown.html"
+    assert main(["view", "helix_tube", "--set", "elastic_sections=6", "--growth", "--html", str(page)]) == 0
+    assert "wall that has not come out" in page.read_text(encoding="utf-8")
+    assert capsys.readouterr().out.splitlines()[-1] == f"{page}: written"
 
 
 def test_sliders_begin_with_the_loaded_robot(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture) -> None:
@@ -350,13 +341,10 @@ BAD = {
     "view helix_tube --growth --force 0 0 1": "--growth must be given without a load",
     "view helix_tube --growth --live keyboard": "--growth must be given without --live",
     "view inflatable_arm --html a.html --live keyboard --port 8000": "without --live, --port",
-    "view inflatable_arm --picture a.png --open": "without --open",
+    "view inflatable_arm --html a.html --open": "without --open",
     "view inflatable_arm --sliders --live keyboard": "--sliders must be given without --live",
     "view inflatable_arm --live keyboard --json": "--live must be given without --json",
-    "view inflatable_arm --overwrite": "together with --html or --picture",
-    "view inflatable_arm --html a.html --at 1": "together with --picture",
-    "view inflatable_arm --picture a.png --at 1.5": "from 0 to 1",
-    "view inflatable_arm --picture a.jpg": "--picture must be a file name that ends in .png",
+    "view inflatable_arm --overwrite": "together with --html or --interactive",
     "view inflatable_arm --port 0": "from 1 to 65535",
     "view inflatable_arm --target nan 0 0": "finite",
     "view inflatable_arm --live .": "a file, or the word keyboard",

@@ -16,10 +16,10 @@ import pytest
 
 import softrobots as sr
 from softrobots.statics.kinematics import frame_placement
-from softrobots.view.browser import find_chromium, show_share, take_picture
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
 from softrobots.view.viewer import Viewer, view
+from studies.shared.browser import find_chromium, show_share, take_picture
 from tests.conftest import PATIENCE
 from tests.support.packed_pages import scene_of
 from tests.support.pictures import coloured, listening, pictures_of, pixels

@@ -18,7 +18,6 @@ from softrobots.core.errors import SoftRobotsError, ViewerError
 from softrobots.core.summary import aligned
 from softrobots.description.paths import urdf_folder, xacro_folder
 from softrobots.robots import ROBOTS
-from softrobots.view.browser import find_chromium
 from softrobots.view.meshcat_page.server import ServerProcess
 
 _PAGE_TIME = 10.0  # [s], longest wait for the page
@@ -79,17 +78,13 @@ def _places(report: _Report) -> Path | None:
     except SoftRobotsError as error:
         report.wrong.append(str(error))
         return None
-    try:
-        browser = browser_text = find_chromium()
-    except ViewerError as error:
-        browser, browser_text = None, f"none, so no pictures of the viewer: {error}"
     cache, kept = cache_folder(), cache_is_kept()
     lost = "" if kept else "; for this process alone: the folder for caches cannot be written"
     compiled = f"{cache} (compiled solvers, by {available_backend()}{lost})"
     package = Path(softrobots.__file__).parent
-    places = {"package": package, "xacro": xacro, "urdf": urdf, "browser": browser, "cache": cache}
+    places = {"package": package, "xacro": xacro, "urdf": urdf, "cache": cache}
     report.answer.update(places=places, cache_writable=kept, backend=available_backend())
-    report.add("", [(name, str(where)) for name, where in (places | {"browser": browser_text, "cache": compiled}).items()])
+    report.add("", [(name, str(where)) for name, where in (places | {"cache": compiled}).items()])
     return urdf
 
 

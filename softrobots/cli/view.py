@@ -5,15 +5,12 @@ from __future__ import annotations
 import argparse
 import contextlib
 import sys
-import tempfile
 import webbrowser
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 from softrobots.cli.options.command_line import address_lines
 from softrobots.cli.options.load_argument import loads_of
-from softrobots.cli.options.output_files import check_ending
 from softrobots.cli.options.robot_argument import model_of, motors_of, source_of
 from softrobots.cli.options.view_options import EXAMPLES, add_view_options, refuse_contradictions
 from softrobots.cli.reports.answers import add_json, print_answer
@@ -32,7 +29,6 @@ from softrobots.statics.inverse_kinematics import IkSolution, solve_ik
 from softrobots.statics.load_estimation import LoadEstimate
 from softrobots.statics.trajectory import Trajectory
 from softrobots.view.animation_frames import Movement
-from softrobots.view.browser import find_chromium, take_picture
 from softrobots.view.figures.vibrations import SWING
 from softrobots.view.live.input import commands_from
 from softrobots.view.live.loop import LiveView, follow, state_line, tip_force
@@ -46,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
         "view",
         help="show a robot in the browser",
         description="Show a robot in the browser, served on this machine only, until Ctrl-C: loaded, at a target, as a saved "
-        "result, growing, or following commands. Or write the page, which works offline, or a picture of it.",
+        "result, growing, or following commands. Or write the page, which works offline.",
         epilog=EXAMPLES,
     )
     add_view_options(parser)
@@ -55,15 +51,11 @@ def add_parser(subparsers: Any) -> None:
 
 
 def run(arguments: argparse.Namespace) -> None:
-    """Show the robot until Ctrl-C, or write a page or a picture."""
+    """Show the robot until Ctrl-C, or write a page."""
     refuse_contradictions(arguments)
-    if arguments.picture is not None:
-        check_ending("--picture", arguments.picture, ".png")
-    for file in (arguments.html, arguments.picture, arguments.interactive):
+    for file in (arguments.html, arguments.interactive):
         if file is not None:
             new_file(file, overwrite=arguments.overwrite)  # refused before the work
-    if arguments.picture is not None:
-        find_chromium()
     if arguments.growth:
         _grow(arguments)
         return
@@ -192,17 +184,12 @@ def _write_interactive(arguments: argparse.Namespace, equilibrium: Equilibrium) 
 
 
 def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, state: str) -> None:
-    """Serve a page, or write it and take its picture."""
-    if arguments.html is None and arguments.picture is None:
+    """Serve a page, or write it."""
+    if arguments.html is None:
         _serve(arguments, viewer, state)
         return
-    with tempfile.TemporaryDirectory() as folder:
-        file = arguments.html or Path(folder) / "page.html"
-        page = viewer.write_html(file, title=str(model.pinocchio.name), overwrite=arguments.overwrite)
-        if arguments.picture is not None:
-            take_picture(page, arguments.picture, share=arguments.at or 0.0)
-    files = [file for file in (arguments.html, arguments.picture) if file is not None]
-    print_answer(arguments, {"files": files}, [state, *(f"{file}: written" for file in files)])
+    page = viewer.write_html(arguments.html, title=str(model.pinocchio.name), overwrite=arguments.overwrite)
+    print_answer(arguments, {"files": [page]}, [state, f"{page}: written"])
 
 
 def _serve(arguments: argparse.Namespace, page: ServedPage, state: str) -> None:

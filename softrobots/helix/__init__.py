@@ -27,7 +27,7 @@ from softrobots.helix.paths import (
 from softrobots.helix.pattern import METHODS, Pattern, SheetPoints, pinch_pattern
 from softrobots.helix.pattern_error import DiscreteCentreLine, ShapeError, discrete_centre_line, shape_error
 from softrobots.helix.shapes import HANDEDNESS, PATHS, Actuator, HelixShape, forward, inverse, measure
-from softrobots.helix.template import write_template, write_template_pages, write_template_table
+from softrobots.helix.template import write_template, write_template_table
 from softrobots.helix.tube import actuator_tension, centre_length, height, length_for_turns, material_twist, turns, volume
 from softrobots.helix.varying_actuator import BentTube, bent_tube
 
@@ -86,6 +86,5 @@ __all__ = [
     "turns",
     "volume",
     "write_template",
-    "write_template_pages",
     "write_template_table",
 ]

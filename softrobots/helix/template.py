@@ -1,4 +1,4 @@
-"""Printed template of a pattern: the unrolled tube to scale as SVG, on one sheet or on pages, and a table of the marks as CSV.
+"""Printed template of a pattern: the unrolled tube to scale on one sheet as SVG, and a table of the marks as CSV.
 
 One user unit of the SVG is 1 mm. Around the drawing of the sheet (`template_drawing`) stand a title with the numbers of the
 plan, a ruler to check the print, and instructions.
@@ -14,14 +14,12 @@ from pathlib import Path
 import numpy as np
 
 from softrobots.core.errors import ParameterError
-from softrobots.core.files import as_path, csv_text, new_file, write_text
+from softrobots.core.files import csv_text, write_text
 from softrobots.helix.design import in_mm
 from softrobots.helix.pattern import Pattern, checked_pattern
-from softrobots.helix.template_drawing import TEXT, Window, draw_sheet, element, marks, mm, segment, text
+from softrobots.helix.template_drawing import TEXT, draw_sheet, element, marks, mm, segment, text
 
-_ROUNDING = 1e-9  # of a page
 _THINNEST, _THICKEST, _LONGEST = 1e-3, 10.0, 200.0  # tubes that can be drawn [m]
-_PAGE, _OVERLAP = 250.0, 20.0  # tube on a page, and the part of it that the next page repeats [mm]
 _LEFT, _RIGHT, _TOP, _BOTTOM = 18.0, 12.0, 42.0, 54.0  # margins around the sheet [mm]
 _TEXT_WIDTH = 252.0  # of title and instructions [mm]
 _LINE_HEIGHT = 4.8
@@ -34,7 +32,7 @@ _TABLE_COLUMNS = (
 
 
 def write_template(pattern: Pattern, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
-    """Draw the unrolled tube to scale on one sheet, as SVG.
+    """Draw the unrolled tube to scale on one sheet, as SVG; printing programs cut long sheets into pages.
 
     Args:
         pattern: The plan.
@@ -51,41 +49,7 @@ def write_template(pattern: Pattern, path: str | os.PathLike[str], *, overwrite:
         OutputError: If the file cannot be written.
     """
     _check_drawable(checked_pattern(pattern))
-    return write_text(path, _svg_text(pattern, Window(0.0, 1e3 * pattern.tube_length)), overwrite=overwrite)
-
-
-def write_template_pages(pattern: Pattern, path: str | os.PathLike[str], *, overwrite: bool = False) -> tuple[Path, ...]:
-    """Draw the unrolled tube to scale on pages of A4 in landscape format, to be glued together at join lines that they share.
-
-    Args:
-        pattern: The plan.
-        path: Name of the files, to which the page number is added: `tube` and `tube.svg` give `tube-1.svg`, `tube-2.svg`, ...
-        overwrite: Replace existing files.
-
-    Returns:
-        The paths of the files.
-
-    Raises:
-        ParameterError: If `pattern` is not a `Pattern`, `path` is not a path, or the tube is too thin, thick or long as in
-            `write_template`.
-        OutputExists: If one of the files exists and `overwrite` is false; then none is written.
-        OutputError: If a file cannot be written.
-    """
-    _check_drawable(checked_pattern(pattern))
-    length, step, base = 1e3 * pattern.tube_length, _PAGE - _OVERLAP, as_path("path", path)
-    if not base.name:
-        raise ParameterError("path", path, "a file name, to which page numbers are added")
-    count = max(1, math.ceil((length - _OVERLAP) / step - _ROUNDING))
-    digits = len(str(count))
-    targets = [
-        new_file(base.with_name(f"{base.stem}-{n + 1:0{digits}}{base.suffix or '.svg'}"), overwrite=overwrite)
-        for n in range(count)
-    ]
-    joins = [step * n + 0.5 * _OVERLAP for n in range(1, count)]  # in the middle of the overlap of two pages
-    for n, target in enumerate(targets):
-        window = Window(step * n, min(step * n + _PAGE, length), n + 1, count, tuple(joins[max(n - 1, 0) : n + 1]))
-        write_text(target, _svg_text(pattern, window), overwrite=overwrite)
-    return tuple(targets)
+    return write_text(path, _svg_text(pattern), overwrite=overwrite)
 
 
 def write_template_table(pattern: Pattern, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
@@ -125,30 +89,29 @@ def _check_drawable(pattern: Pattern) -> None:
         raise ParameterError("tube_length", pattern.tube_length, f"at most {_LONGEST} m for a drawing")
 
 
-def _svg_text(plan: Pattern, window: Window) -> str:
-    """Drawing of one page."""
-    around, shown = 1e3 * plan.sheet_width, window.end - window.start
-    width, height = _LEFT + max(shown, _TEXT_WIDTH) + _RIGHT, _TOP + around + _BOTTOM
+def _svg_text(plan: Pattern) -> str:
+    """The drawing."""
+    around, length = 1e3 * plan.sheet_width, 1e3 * plan.tube_length
+    width, height = _LEFT + max(length, _TEXT_WIDTH) + _RIGHT, _TOP + around + _BOTTOM
     root = ET.Element("svg", {"xmlns": "http://www.w3.org/2000/svg", "version": "1.1"})
     root.attrib |= {"width": f"{mm(width)}mm", "height": f"{mm(height)}mm", "viewBox": f"0 0 {mm(width)} {mm(height)}"}
     root.attrib |= {"font-family": "Arial, Helvetica, sans-serif", "font-size": mm(TEXT)}
     element(root, "rect", fill="white", x=0.0, y=0.0, width=width, height=height)
-    _draw_title(root, plan, _LEFT, f" - page {window.page} of {window.pages}" if window.pages > 1 else "")
+    _draw_title(root, plan, _LEFT)
     clip = element(root, "clipPath", id="sheet-clip")
-    element(clip, "rect", x=window.start, y=0.0, width=shown, height=around)
-    origin = f"translate({mm(_LEFT - window.start)} {mm(_TOP)})"
-    sheet = element(root, "g", id="sheet", transform=origin, fill="none", stroke="black")
-    draw_sheet(sheet, plan, window)
-    _draw_ruler_and_instructions(root, plan, _LEFT, _TOP + around + 13.0, paged=window.pages > 1)
+    element(clip, "rect", x=0.0, y=0.0, width=length, height=around)
+    sheet = element(root, "g", id="sheet", transform=f"translate({mm(_LEFT)} {mm(_TOP)})", fill="none", stroke="black")
+    draw_sheet(sheet, plan)
+    _draw_ruler_and_instructions(root, plan, _LEFT, _TOP + around + 13.0)
     ET.indent(root)
     return '<?xml version="1.0" encoding="UTF-8"?>\n' + ET.tostring(root, encoding="unicode") + "\n"
 
 
-def _draw_title(root: ET.Element, plan: Pattern, left: float, page: str) -> None:
+def _draw_title(root: ET.Element, plan: Pattern, left: float) -> None:
     """Draw the title and the numbers of the plan, down to 31 mm from the top."""
     block = element(root, "g", id="title-block")
     noun = {"pinch": "pinch", "tape": "tape", "stoppers": "stopper"}[plan.method]
-    text(block, f"Helical actuation of an inflated tube: {noun} pattern{page}", (left, 9.0), size=5.0, font_weight="bold")
+    text(block, f"Helical actuation of an inflated tube: {noun} pattern", (left, 9.0), size=5.0, font_weight="bold")
     shape, (removed, noun_plural) = plan.shape, ("gap", "gaps") if plan.method == "stoppers" else ("pinched", "pinches")
     columns = (
         (
@@ -175,7 +138,7 @@ def _draw_title(root: ET.Element, plan: Pattern, left: float, page: str) -> None
             text(block, line, (left + x, 16.5 + _LINE_HEIGHT * row))
 
 
-def _draw_ruler_and_instructions(root: ET.Element, plan: Pattern, left: float, top: float, *, paged: bool) -> None:
+def _draw_ruler_and_instructions(root: ET.Element, plan: Pattern, left: float, top: float) -> None:
     """Draw a ruler of 100 mm and the instructions, 32 mm in all."""
     ruler = element(root, "g", id="check-ruler", stroke="black", stroke_width=0.3)
     segment(ruler, (left, top + 3.0), (left + 100.0, top + 3.0), class_="ruler")
@@ -185,18 +148,17 @@ def _draw_ruler_and_instructions(root: ET.Element, plan: Pattern, left: float, t
     text(ruler, "This ruler is 100 mm long: print at 100 %, not fitted to the page, and measure it.", (left + 104.0, top + 3.0))
     legend = element(root, "g", id="legend")
     y = top + 11.0
-    for number, lines in enumerate(_instructions(plan, paged), 1):
+    for number, lines in enumerate(_instructions(plan), 1):
         text(legend, f"{number}.", (left, y))
         for line in lines:
             text(legend, line, (left + _INDENT, y))
             y += _LINE_HEIGHT
 
 
-def _instructions(plan: Pattern, paged: bool) -> tuple[tuple[str, ...], ...]:
+def _instructions(plan: Pattern) -> tuple[tuple[str, ...], ...]:
     """Steps of one or two lines."""
-    glue = "Glue the pages together, join on join. " if paged else ""
     wrap = (
-        f"{glue}The sheet is the tube unrolled, seen from outside. Cut it out and wrap it around the flat, empty tube:",
+        "The sheet is the tube unrolled, seen from outside. Cut it out and wrap it around the flat, empty tube:",
         "the lines A lie on one edge of the flat tube (both are the same line), B on the other. Mark the tube through it.",
     )
     if plan.method == "stoppers":

@@ -33,37 +33,22 @@ Point = tuple[float, float]
 """Position on the drawing, y downwards [mm]."""
 
 
-class Window(NamedTuple):
-    """The part of the sheet that a page shows."""
-
-    start: float
-    """Along the tube [mm]."""
-    end: float
-    """Along the tube [mm]."""
-    page: int = 1
-    """Number of this page."""
-    pages: int = 1
-    """Number of pages."""
-    joins: tuple[float, ...] = ()
-    """Lines at which the page is joined to its neighbours, along the tube [mm]."""
-
-
-def draw_sheet(sheet: ET.Element, plan: Pattern, window: Window) -> None:
-    """Draw the part of the sheet in a window: outline, folds, actuator line, and the marks along it."""
+def draw_sheet(sheet: ET.Element, plan: Pattern) -> None:
+    """Draw the sheet: outline, folds, actuator line, and the marks along it."""
     around, length = 1e3 * plan.sheet_width, 1e3 * plan.tube_length
     line = _Line(math.cos(plan.angle), turning_sign(plan.handedness) * math.sin(plan.angle))
     half_mark = min(0.1 * around, 12.0, 0.2 * around * line.along)  # less where wraps are near to each other
     folds = element(sheet, "g", id="folds", stroke="#808080", stroke_width=0.35, stroke_dasharray="5 2")
     for y in (0.0, 0.5 * around, around):
-        segment(folds, (window.start, y), (window.end, y), class_="fold")
-    _draw_marks(sheet, plan, window, line, half_mark)
+        segment(folds, (0.0, y), (length, y), class_="fold")
+    _draw_marks(sheet, plan, line, half_mark)
     red = element(sheet, "g", id="actuator-line", stroke="#d00000", stroke_width=0.4, **_ON_SHEET)
     for start, end, wrap in _wrapped(plan, around):
         segment(red, start, end, class_="actuator-line", data_wrap=str(wrap))
-    box = element(sheet, "g", stroke_width=0.3, **(_ON_SHEET if window.pages > 1 else {}))
+    box = element(sheet, "g", stroke_width=0.3)
     element(box, "rect", id="sheet-outline", x=0.0, y=0.0, width=length, height=around)
-    _draw_numbers(sheet, plan, window, line, half_mark)
-    _draw_edges(sheet, plan, window)
+    _draw_numbers(sheet, plan, line, half_mark)
+    _draw_edges(sheet, plan)
 
 
 def marks(plan: Pattern) -> list[tuple[int, str, float, float]]:
@@ -111,12 +96,12 @@ def _wrapped(plan: Pattern, around: float) -> list[tuple[Point, Point, int]]:
     return pieces
 
 
-def _draw_marks(sheet: ET.Element, plan: Pattern, window: Window, line: _Line, half_mark: float) -> None:
+def _draw_marks(sheet: ET.Element, plan: Pattern, line: _Line, half_mark: float) -> None:
     """Draw the pinches, pieces of tape, stoppers and gaps."""
     box = element(sheet, "g", id="marks", stroke_width=0.25, stroke_linejoin="round", **_ON_SHEET)
     around, bar = 1e3 * plan.sheet_width, 0.25 * half_mark
     aside = {"pinch": half_mark, "tape": 0.5e3 * (plan.tape_width or 0.0), "stopper": bar, "gap": bar}
-    for number, kind, start, end, base in _shown(plan, window, line):
+    for number, kind, start, end, base in _placed(plan, line):
         middle, reach = base + 0.5 * (start + end) * line.across, aside[kind] + 0.5 * (end - start) + 1.0
         attributes = {"data_number": str(number), "data_start": mm(start), "data_end": mm(end)}
         for shift in (0.0, around, -around):
@@ -144,50 +129,40 @@ def _draw_pinch(mark: ET.Element, line: _Line, start: float, end: float, half_ma
         element(mark, "polyline", class_="arrow", points=_coordinates([line.place(*place, base) for place in places]))
 
 
-def _draw_numbers(sheet: ET.Element, plan: Pattern, window: Window, line: _Line, half_mark: float) -> None:
+def _draw_numbers(sheet: ET.Element, plan: Pattern, line: _Line, half_mark: float) -> None:
     """Draw the numbers of pinches and gaps above the line, or below if there is no room; only each n-th of a dense pattern."""
-    around, spacing = 1e3 * plan.sheet_width, 1e3 * plan.spacing * line.along
+    around, length, spacing = 1e3 * plan.sheet_width, 1e3 * plan.tube_length, 1e3 * plan.spacing * line.along
     label_step = next((n for n in (1, 2, 5, 10, 20, 50, 100, 200, 500) if n * spacing >= 7.0), 1000)
     halo = {"class": "number", "stroke": "white", "stroke_width": "0.8", "paint_order": "stroke"}
-    for number, kind, start, end, base in _shown(plan, window, line):
+    for number, kind, start, end, base in _placed(plan, line):
         if kind not in ("pinch", "gap") or not (number == 1 or number % label_step == 0):
             continue
         aside = (half_mark if kind == "pinch" else 0.25 * half_mark) + 2.4
         for side in (-aside, aside):
             x, y = line.place(0.5 * (start + end), side, base)
-            if window.start + 2.5 <= x <= window.end - 2.5 and 2.0 <= y <= around - 2.0:
+            if 2.5 <= x <= length - 2.5 and 2.0 <= y <= around - 2.0:
                 text(sheet, str(number), (x, y + 0.9), size=_SMALL, anchor="middle", **halo)
                 break
 
 
-def _shown(plan: Pattern, window: Window, line: _Line) -> Iterator[tuple[int, str, float, float, float]]:
-    """Number, kind, start and end of the marks on a page, and where the line through their middle meets x = 0 [mm]."""
+def _placed(plan: Pattern, line: _Line) -> Iterator[tuple[int, str, float, float, float]]:
+    """Number, kind, start and end of the marks, and where the line through their middle meets x = 0 [mm]."""
     rows = marks(plan)
     middles = np.array([0.5 * (start + end) for _, _, start, end in rows])
     bases = 1e3 * (plan.locate(middles).y - middles * line.across)
-    for (number, kind, start, end), middle, base in zip(rows, middles, bases, strict=True):
-        reach = 500.0 * (end - start) + 15.0
-        if window.start - reach <= 1e3 * middle * line.along <= window.end + reach:
-            yield number, kind, 1e3 * start, 1e3 * end, float(base)
+    for (number, kind, start, end), base in zip(rows, bases, strict=True):
+        yield number, kind, 1e3 * start, 1e3 * end, float(base)
 
 
-def _draw_edges(sheet: ET.Element, plan: Pattern, window: Window) -> None:
-    """Draw the names of folds and ends, joins of pages, and a scale along the tube."""
+def _draw_edges(sheet: ET.Element, plan: Pattern) -> None:
+    """Draw the names of folds and ends, and a scale along the tube."""
     around, length = 1e3 * plan.sheet_width, 1e3 * plan.tube_length
     for name, y in (("fold A", 0.0), ("fold B", 0.5 * around), ("fold A", around)):
-        text(sheet, name, (window.start - 1.5, y + 1.0), size=_SMALL, anchor="end")
-    if window.page == 1:
-        text(sheet, "BASE", (0.0, -1.8), font_weight="bold")
-    if window.page == window.pages:
-        text(sheet, "TIP", (length, -1.8), anchor="end", font_weight="bold")
-    for x in window.joins:
-        green = element(sheet, "g", class_="join", stroke="#008040", stroke_width=0.3, data_x=x)
-        segment(green, (x, -4.0), (x, around + 1.5))
-        for share in (0.25, 0.75):
-            segment(green, (x - 4.0, share * around), (x + 4.0, share * around))
-        text(green, "join", (x, -5.0), size=_SMALL, anchor="middle")
+        text(sheet, name, (-1.5, y + 1.0), size=_SMALL, anchor="end")
+    text(sheet, "BASE", (0.0, -1.8), font_weight="bold")
+    text(sheet, "TIP", (length, -1.8), anchor="end", font_weight="bold")
     scale = element(sheet, "g", id="scale", stroke_width=0.2)
-    for tick in range(math.ceil(window.start / 10.0 - 1e-9), math.floor(window.end / 10.0 + 1e-9) + 1):
+    for tick in range(math.floor(length / 10.0 + 1e-9) + 1):
         x, long = 10.0 * tick, tick % 5 == 0
         segment(scale, (x, around + 2.0), (x, around + (4.5 if long else 3.2)))
         if tick == 0:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import numpy as np
 
-from softrobots.view.browser import show_share
+from studies.shared.browser import show_share
 
 
 def listening(pid: int) -> set[str]:

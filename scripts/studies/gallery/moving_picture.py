@@ -12,7 +12,7 @@ from softrobots.core.checks import positive_integer, positive_number
 from softrobots.core.errors import MissingDependency, ParameterError
 from softrobots.core.files import write_bytes
 from softrobots.core.progress import with_progress
-from softrobots.view.browser import open_page, show_share
+from studies.shared.browser import open_page, show_share
 
 _FREQUENT = 96  # of 256 colours
 

@@ -8,7 +8,6 @@ from pathlib import Path
 from softrobots.cli.options.command_line import add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads
 from softrobots.cli.options.robot_argument import add_model, add_motors
-from softrobots.core.checks import finite_number
 from softrobots.core.errors import ParameterError
 
 EXAMPLES = """examples:
@@ -18,25 +17,23 @@ EXAMPLES = """examples:
   softrobots view pcc_arm --sliders
   softrobots view inflatable_arm --interactive arm.html        a file that solves by itself, on a phone too
   softrobots view helix_tube --growth --html growth.html
-  softrobots view --result trajectory.npz --picture end.png --at 1
+  softrobots view --result trajectory.npz --speed 0.25 --html slow.html
   softrobots view --result branches.npz --branch=+spring_1_up
 """
 
 _NOT_WITH = {
     "--result": ("ROBOT", "--set", "--parameters", "--spring", "--tip", "--motors", "--target", "--growth", "a load"),
     "--growth": ("--motors", "--target", "a load", "--live", "--sliders", "--interactive"),
-    "--interactive": ("--live", "--sliders", "--html", "--picture", "--open", "--port"),
+    "--interactive": ("--live", "--sliders", "--html", "--open", "--port"),
     "--html": ("--live", "--sliders", "--open", "--port"),
-    "--picture": ("--live", "--sliders", "--open", "--port"),
     "--sliders": ("--live",),
     "--live": ("--json",),
 }
-_SWITCHES = "motors target result branch growth live sliders interactive html picture at speed overwrite open port json"
+_SWITCHES = "motors target result branch growth live sliders interactive html speed overwrite open port json"
 _ONLY_WITH = {
     "--branch": ("--result",),
     "--speed": ("--result",),
-    "--overwrite": ("--html", "--picture", "--interactive"),
-    "--at": ("--picture",),
+    "--overwrite": ("--html", "--interactive"),
 }
 
 
@@ -67,10 +64,8 @@ def add_view_options(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--interactive", type=Path, metavar="FILE.html", help=help_text)
     parser.add_argument("--html", type=Path, metavar="FILE", help="write the page instead of serving it (served)")
-    parser.add_argument("--picture", type=Path, metavar="FILE.png", help="take a picture of the page with Chromium (served)")
-    add_numbers(parser, "--at", "SHARE", "where --picture stops an animation, from 0, its start, to 1, its end [-] (0)")
     add_numbers(parser, "--speed", "S", "how fast a trajectory or motion is played, relative to real time [-] (1)")
-    parser.add_argument("--overwrite", action="store_true", help="allow --html, --picture and --interactive to replace files")
+    parser.add_argument("--overwrite", action="store_true", help="allow --html and --interactive to replace files")
     parser.add_argument("--open", action="store_true", help="open the page in the browser of this machine")
     parser.add_argument("--port", type=int, metavar="N", help="port of the page (the first free one from 7000; sliders: 8080)")
 
@@ -95,7 +90,5 @@ def refuse_contradictions(arguments: argparse.Namespace) -> None:
     for option, others in _ONLY_WITH.items():
         if given[option] and not any(given[other] for other in others):
             raise ParameterError(option, "given", f"given together with {' or '.join(others)}")
-    if arguments.at is not None and not 0.0 <= finite_number("--at", arguments.at) <= 1.0:
-        raise ParameterError("--at", arguments.at, "from 0 to 1")
     if arguments.port is not None and not 0 < arguments.port < 65536:
         raise ParameterError("--port", arguments.port, "from 1 to 65535")

@@ -18,7 +18,7 @@ EXTRAS = {
     "pandas": "tables as DataFrames: softrobots.to_dataframe",
     "mcap": "logs for ROS 2 and Foxglove: -o FILE.mcap",
     "viser": "sliders in the browser: softrobots view ROBOT --sliders",
-    "pictures": "pictures of the browser view",
+    "pictures": "pictures of pages, which scripts take",
     "robots": "the UR5 and other third-party robots",
     "interop": "simulators; load_model reads MJCF and SDF",
     "interop-kinematics": "tools to compare kinematics with: scripts/interoperability.py",
