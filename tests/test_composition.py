@@ -14,9 +14,9 @@ import pinocchio as pin
 import pytest
 
 import softrobots as sr
-from softrobots.description.composition import fix_joints
 from softrobots.description.tag_reader import read_tags
 from softrobots.statics.kinematics import frame_placement
+from studies.shared.held_motors import with_motors_held
 from tests.conftest import missing
 from tests.support.foreign import INERTIAL, joint
 from tests.support.tables import each_row
@@ -155,7 +155,7 @@ def test_soft_on_soft_keeps_both_inflated() -> None:
 def test_ik_with_the_joints_of_the_carrier_compensates_the_sag(ur5: Path, tool: Callable) -> None:
     """The tip that yourdfpy computes for the compensated robot is where the unloaded one was."""
     yourdfpy = tool("yourdfpy")
-    arm = fix_joints(sr.InflatableArm(), {"motor_1": 0.2, "motor_2": 1.2, "motor_3": -0.4})
+    arm = with_motors_held(sr.InflatableArm().urdf(), {"motor_1": 0.2, "motor_2": 1.2, "motor_3": -0.4})
     model = sr.load_model(sr.mount(ur5, "tool0", arm, xyz=(0.0, 0.0, 0.165)))
     assert model.n_motors == 6
     start = (0.3, -2.1, 1.9, 0.2, 1.5, 0.1)
@@ -171,24 +171,16 @@ def test_ik_with_the_joints_of_the_carrier_compensates_the_sag(ur5: Path, tool: 
     assert found.equilibrium.stable
 
 
-def test_fixed_joints_stand_where_they_were(rng: np.random.Generator) -> None:
+def test_motors_held_by_the_scripts_stand_where_they_were(rng: np.random.Generator) -> None:
     text = sr.InflatableArm().urdf()
     held = {"motor_1": 0.7, "motor_2": -0.4, "motor_3": 0.0}
-    fixed = fix_joints(text, held)
+    fixed = with_motors_held(text, held)
     springs = {name: value for name, value in drawn(text, rng).items() if name.startswith("spring")}
     before, after = placements(text, springs | held), placements(fixed, springs)
     assert before.keys() == after.keys()
     for name, pose in before.items():
         assert np.allclose(after[name].homogeneous, pose.homogeneous, rtol=0.0, atol=1e-14)
     assert sr.load_model(fixed).motor_joints == ()
-
-
-def test_a_sliding_joint_can_be_fixed() -> None:
-    text = (
-        f'<robot name="slide"><link name="base">{INERTIAL}</link>' + joint("s", "base", "a", "0 0 1", "prismatic") + "</robot>"
-    )
-    found = placements(fix_joints(text, {"s": 0.25}), {})["a"]
-    assert np.allclose(found.homogeneous, placements(text, {"s": 0.25})["a"].homogeneous, rtol=0.0, atol=1e-15)
 
 
 def test_every_reference_gets_the_prefix() -> None:
@@ -324,38 +316,6 @@ SECTIONS, LUMPED = SMALL["pcc"](), SMALL["pcc_lumped"]()
 def test_what_does_not_fit_is_refused(arguments: tuple, options: dict, error: type, message: str) -> None:
     with pytest.raises(error, match=message):
         sr.mount(*arguments, **options)
-
-
-@each_row(
-    ("robot", "positions", "error", "message"),
-    [
-        (ARM, {"motor_9": 0.0}, sr.NameNotFound, "no movable joint is called 'motor_9'"),
-        (ARM, {"base_fixed": 0.0}, sr.NameNotFound, "no movable joint"),
-        (ARM, {"motor_1": 4.0}, sr.ParameterError, "within the limits"),
-        (ARM, {"motor_1": np.nan}, sr.ParameterError, "finite"),
-        (ARM, {"spring_1_up": 0.1}, sr.DescriptionError, "is elastic"),
-        (SECTIONS, {"section_1_1_u1": 0.0}, sr.DescriptionError, "is elastic"),
-        (ARM, ["motor_1"], sr.ParameterError, "a mapping"),
-        (
-            '<robot name="m"><link name="base"/>' + joint("a", "base", "la", "0 0 1")
-            + joint("b", "la", "lb", "0 0 1").replace("<limit", '<mimic joint="a"/><limit') + "</robot>",
-            {"a": 0.1}, sr.DescriptionError, "mimicked by b",
-        ),
-    ],
-)  # fmt: skip
-def test_joints_that_cannot_be_fixed_are_refused(robot: object, positions: object, error: type, message: str) -> None:
-    with pytest.raises(error, match=message):
-        fix_joints(robot, positions)
-
-
-def test_every_joint_that_mimics_a_fixed_one_must_be_fixed() -> None:
-    followers = [
-        joint(name, parent, child, "0 0 1").replace("<limit", '<mimic joint="j1"/><limit')
-        for name, parent, child in (("j2", "b", "c"), ("j3", "c", "d"))
-    ]
-    text = '<link name="a"/>' + joint("j1", "a", "b", "0 0 1") + "".join(followers)
-    with pytest.raises(sr.DescriptionError, match="mimicked by j2"):
-        fix_joints(f'<robot name="r">{text}</robot>', {"j1": 0.3, "j3": 0.3})
 
 
 ON_WORLD = '<link name="world"/>' + joint("base_fixed", "world", "base", "0 0 1", "fixed")

@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.description.composition import fix_joints
 from softrobots.description.mesh_files import MissingMeshWarning, find_mesh, with_absolute_paths
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.view.mesh_triangles import Triangles
 from softrobots.view.robot_shapes import RobotShapes, Shape
 from softrobots.view.viewer import Viewer
+from studies.shared.held_motors import with_motors_held
 from tests.conftest import missing
 from tests.support.foreign import INERTIAL, joint
 
@@ -144,7 +144,7 @@ def carried() -> sr.SoftModel:
         ur5 = robot_file(UR5)
     except sr.MissingDependency as error:
         missing(str(error))
-    arm = fix_joints(sr.InflatableArm(), {"motor_1": 0.0, "motor_2": 1.5, "motor_3": 0.0})
+    arm = with_motors_held(sr.InflatableArm().urdf(), {"motor_1": 0.0, "motor_2": 1.5, "motor_3": 0.0})
     return sr.load_model(sr.mount(ur5, "tool0", arm))
 
 

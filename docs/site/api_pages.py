@@ -63,7 +63,7 @@ PAGES = {
             *_top("load_model", "with_springs", "with_points", "SoftModel", "SpringGroup", "grown_coordinates"),
             *(f"softrobots.robots.parameter_file.{name}" for name in ("read_robot", "read_parameters", "write_parameters")),
             *_top("capsule_error"),
-            *_top("mount", "description.composition.fix_joints", "description.third_party.robot_file", "__version__"),
+            *_top("mount", "description.third_party.robot_file", "__version__"),
         ),
     ),
     "statics": ApiPage(

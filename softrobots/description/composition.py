@@ -9,7 +9,6 @@ from __future__ import annotations
 import glob
 import re
 import tempfile
-from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.dom import minidom
@@ -17,7 +16,7 @@ from xml.dom import minidom
 import numpy as np
 import pinocchio as pin
 
-from softrobots.core.checks import finite_array, finite_number, read_only
+from softrobots.core.checks import finite_array, read_only
 from softrobots.core.errors import DescriptionError, NameNotFound, ParameterError
 from softrobots.description.expansion import expand
 from softrobots.description.paths import xacro_folder
@@ -29,7 +28,6 @@ from softrobots.description.tag_reader import read_tags
 from softrobots.description.urdf_tags import NAMESPACE, RobotTags
 
 _WORLD = "world"
-_JOINT_DETAILS = ("axis", "limit", "dynamics", "mimic", "safety_controller", "calibration")
 
 
 def mount(
@@ -116,48 +114,6 @@ def mount(
         text = expand(xacro_folder() / "mounted.urdf.xacro", arguments)
     read_tags(text, f"{carrier.label} with {child.label} on {link}")
     return text
-
-
-def fix_joints(robot: Robot | Path | str, positions: Mapping[str, float]) -> str:
-    """Replace motor joints by fixed ones at given positions, e.g. those of an arm that carries another robot.
-
-    Args:
-        robot: A robot of this package, the path of a URDF file, or URDF text.
-        positions: Position by joint name [rad or m].
-
-    Returns:
-        URDF text in which these joints are fixed with their links at these positions.
-
-    Raises:
-        ParameterError: If an argument has the wrong type, or a position is not finite or beyond the limits of its joint.
-        NameNotFound: If there is no such movable joint.
-        DescriptionError: If the description cannot be read, or a joint has a spring, is part of a section, is mimicked by
-            another joint that moves, or is neither revolute, continuous nor prismatic.
-    """
-    if not isinstance(positions, Mapping):
-        raise ParameterError("positions", positions, "a mapping {joint: position}")
-    part = _read(robot, "robot")
-    movable = {joint.name: joint for joint in part.tree.joints if joint.movable}
-    inside = {name for section in part.tags.sections for name in section.joints}
-    elements = {e.getAttribute("name"): e for e in children(part.dom) if e.tagName == "joint"}
-    mimics = [(m.getAttribute("joint"), n) for n, e in elements.items() for m in e.getElementsByTagName("mimic")]
-    for name, value in positions.items():
-        if name not in movable:
-            raise NameNotFound("movable joint", str(name), movable)
-        joint, where = movable[name], f"joint {name} of {part.label}"
-        position = finite_number(f"positions[{name!r}]", value, "rad or m")
-        if not joint.limits[0] <= position <= joint.limits[1]:
-            raise ParameterError(f"positions[{name!r}]", value, f"within the limits {list(joint.limits)}")
-        if name in part.tags.springs or name in inside:
-            raise DescriptionError(f"{where} is elastic; only joints without a spring can be fixed")
-        following = [follower for followed, follower in mimics if followed == name and follower not in positions]
-        if following:
-            raise DescriptionError(f"{where} is mimicked by {', '.join(following)}; fix that, too")
-        if joint.kind not in ("revolute", "continuous", "prismatic"):
-            raise DescriptionError(f"{where} is {joint.kind}; revolute, continuous and prismatic joints can be fixed")
-    for name, value in positions.items():
-        _fix(part.document, elements[name], movable[name], float(value))
-    return part.document.toxml()
 
 
 class _Part(NamedTuple):
@@ -262,17 +218,3 @@ def _quote(node: Any) -> None:
 
 def _quoted(text: str) -> str:
     return text.replace("$", "${'$'}")
-
-
-def _fix(document: minidom.Document, element: minidom.Element, joint: Joint, position: float) -> None:
-    element.setAttribute("type", "fixed")
-    for inner in children(element):
-        if inner.tagName in _JOINT_DETAILS or inner.namespaceURI == NAMESPACE:
-            element.removeChild(inner)
-    if position == 0.0:
-        return
-    placed = joint.placement_at(position)
-    origins = [inner for inner in children(element) if inner.tagName == "origin"]
-    origin = origins[0] if origins else element.appendChild(document.createElement("origin"))
-    origin.setAttribute("xyz", number_text(placed.position))
-    origin.setAttribute("rpy", number_text(placed.rpy))

@@ -10,7 +10,7 @@ import numpy as np
 
 from softrobots import inflated_beam
 from softrobots.core.checks import FloatArray, read_only
-from softrobots.description.composition import fix_joints, mount
+from softrobots.description.composition import mount
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.dynamics.motion import Motion
 from softrobots.model.loader import load_model
@@ -23,6 +23,7 @@ from softrobots.view.viewer import Viewer, view
 from studies.contact import examples as contact
 from studies.gallery.your_robot import measured_poses
 from studies.motion.examples import gust, release
+from studies.shared.held_motors import with_motors_held
 from studies.ur5.bench import UR5Bench
 from studies.ur5.bench_run import push_link
 
@@ -209,7 +210,7 @@ def characterisation_bench() -> Viewer:
 
 def ur5_with_soft_arm() -> Viewer:
     """A UR5 carries the inflatable arm with 1 kg at its tip (needs example-robot-data)."""
-    arm = fix_joints(InflatableArm(), {"motor_1": 0.0, "motor_2": math.pi / 2, "motor_3": 0.0})
+    arm = with_motors_held(InflatableArm().urdf(), {"motor_1": 0.0, "motor_2": math.pi / 2, "motor_3": 0.0})
     model = load_model(mount(robot_file(UR5), "tool0", arm, xyz=(0.0, 0.0, 0.165)))
     pose, payload = (0.0, -2.1, 1.9, 0.2, math.pi / 2, 0.0), (0.0, 0.0, -9.81)
     return view(model, solve_equilibrium(model, pose, payload, gravity=EARTH_GRAVITY))

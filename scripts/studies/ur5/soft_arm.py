@@ -12,8 +12,8 @@ import numpy as np
 
 import softrobots as sr
 from softrobots.core.checks import FloatArray, finite_array, positive_number, read_only
-from softrobots.description.composition import fix_joints
 from softrobots.description.rigid_tree_urdf import read_rigid_tree
+from studies.shared.held_motors import with_motors_held
 
 PAYLOAD = {"inflatable_arm": 1.0, "helix_tube": 0.001, "pcc_arm": 0.05}
 """Payload of each arm, well below wrinkling [kg]."""
@@ -63,7 +63,7 @@ def within_limits(option: str, angles: Sequence[float], limits: FloatArray) -> N
 
 def mounted(ur5: Path, arm: SoftArm, held: dict[str, float]) -> str:
     """URDF of the UR5 with the arm on its flange, the motors of the arm held; the foot of the arm stands on the flange."""
-    text = fix_joints(arm, held)
+    text = with_motors_held(arm.urdf(), held)
     foot = read_rigid_tree(text).body("base_link").visuals[0]  # a cylinder along z below the origin of the arm
     height = foot.size[1] / 2.0 - float(foot.placement.position[2])
     return sr.mount(ur5, "tool0", text, xyz=(0.0, 0.0, height))
