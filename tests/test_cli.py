@@ -176,7 +176,7 @@ def test_help_fits_80_columns_and_its_examples_stay_the_same_commands(
 @pytest.mark.parametrize(
     ("words", "message"),
     [
-        (["solve", "inflatable_arm", "--critical-load", "0", "0", "0"], "--critical-load must be different from zero"),
+        (["branches", "inflatable_arm", "--direction", "0", "0", "0"], "--direction must be different from zero"),
         (["solve", "inflatable_arm", "--moment", "nan", "0", "0"], "--moment must be an array"),
         (["solve", "inflatable_arm", "--wrench", "tip", *"00000", "inf"], "--wrench must be an array"),
         (["solve", "inflatable_arm", "--max-iterations", "0"], "--max-iterations must be a positive integer"),

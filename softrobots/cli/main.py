@@ -47,7 +47,6 @@ _ALIASES = {
     "q_motors": "motors",
     "q_motors0": "start",
     "motor_torques": "torques",
-    "direction": "critical_load",
     "orientation": "direction",
     "segment_lengths": "rest",
     "muscle_distance": "distance",

@@ -12,10 +12,9 @@ from softrobots.cli.options.robot_argument import add_model, add_motors, motors_
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.reports.equilibrium_report import equilibrium_answer
 from softrobots.core.checks import finite_array
-from softrobots.core.errors import NeutralEquilibrium, NoCriticalLoad
-from softrobots.core.summary import Part, Table, formatted, text_of
+from softrobots.core.errors import NeutralEquilibrium
+from softrobots.core.summary import Part, Table, text_of
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.buckling.critical_load import critical_load
 from softrobots.statics.elastic_state import TOLERANCE
 from softrobots.statics.elastostatics import METHODS
 from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
@@ -25,7 +24,6 @@ from softrobots.view.figures.picture import plot
 _EXAMPLES = """examples:
   softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --force 0 10 -15
   softrobots solve inflatable_arm --set stiffness=200 --gravity --compliance --json
-  softrobots solve inflatable_arm --critical-load -1 0 0          the force at which the straight arm buckles
   softrobots solve inflatable_arm --force 0 10 -15 --wrench link_1 0 0 -5 0 0 0 -o sagging.npz
   softrobots solve pcc_arm --motors 0.50 0.53 0.55 0.54 0.51 0.52 --gravity --plot shape.png
   softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --gravity --environment room.yaml
@@ -58,10 +56,6 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--max-iterations", type=int, metavar="N", help=help_text)
     help_text = "also the motion of the tip per wrench added there, 6 by 6 [m/N, m/(N m); rad/N, rad/(N m)] (left out)"
     parser.add_argument("--compliance", action="store_true", help=help_text)
-    help_text = (
-        "also the smallest force [N] in this direction that buckles the robot, at --frame, with --gravity alone (left out)"
-    )
-    add_numbers(parser, "--critical-load", "X Y Z", help_text)
     add_output(parser, "the equilibrium")
     add_plot(parser, "the loaded shape")
     add_json(parser)
@@ -86,11 +80,8 @@ def run(arguments: argparse.Namespace) -> None:
     answer, parts = equilibrium_answer(equilibrium), equilibrium.summary_parts()
     if arguments.compliance:
         parts[-1:] = [*_compliance(model, equilibrium, answer), parts[-1]]
-    lines = text_of(parts, None)
-    if arguments.critical_load is not None:
-        lines += f"\ncritical load  {_critical_load(model, equilibrium, arguments, answer)}"
     files = save(arguments, equilibrium) + write_plot(arguments, lambda: plot(equilibrium))
-    print_answer(arguments, answer, lines, files)
+    print_answer(arguments, answer, text_of(parts, None), files)
 
 
 def _compliance(model: SoftModel, equilibrium: Equilibrium, answer: dict[str, Any]) -> list[Part]:
@@ -107,15 +98,3 @@ def _compliance(model: SoftModel, equilibrium: Equilibrium, answer: dict[str, An
 
 _MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
 _WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
-
-
-def _critical_load(model: SoftModel, equilibrium: Equilibrium, arguments: argparse.Namespace, answer: dict[str, Any]) -> str:
-    answer["units"] |= {"critical_load": "N", "stable_up_to": "N"}
-    direction, gravity = arguments.critical_load, equilibrium.load.gravity
-    try:
-        force = critical_load(model, equilibrium.q_motors, direction, frame=arguments.frame, gravity=gravity)
-    except NoCriticalLoad as error:
-        answer |= {"critical_load": None, "stable_up_to": error.max_force}
-        return f"none: {error}"
-    answer |= {"critical_load": force, "stable_up_to": force}
-    return f"{formatted(force)} N along {formatted(direction)}"
