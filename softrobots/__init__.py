@@ -8,7 +8,6 @@ import softrobots.dynamics.saved_motion
 import softrobots.identification.saved_identification
 import softrobots.statics.contact.saved_path  # noqa: F401  (adds the kinds of results that can be saved)
 from softrobots import constant_curvature, export, helix, inflated_beam
-from softrobots.core.data_frame import to_dataframe
 from softrobots.core.errors import (
     ClusterError,
     DescriptionError,
@@ -30,7 +29,7 @@ from softrobots.core.errors import (
     TargetUnreachable,
     ViewerError,
 )
-from softrobots.core.result_file import load_result, save_csv, save_result
+from softrobots.core.result_file import load_result, save_csv, save_result, to_dataframe
 from softrobots.core.suspicion import SuspiciousInputWarning
 from softrobots.description.composition import mount
 from softrobots.dynamics.controllers import PD, ClosedLoop

@@ -22,7 +22,7 @@ from softrobots.cli.options.output_files import (
 )
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
-from softrobots.cli.reports.ik_report import solution_answer, trajectory_answer
+from softrobots.cli.reports.robot_answers import solution_answer, trajectory_answer
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import ParameterError
 from softrobots.model.soft_model import SoftModel

@@ -17,7 +17,7 @@ from softrobots.cli.options.robot_argument import (
     statics_model_of,
 )
 from softrobots.cli.reports.answers import Fact, add_json, answer_of, attributes, print_answer
-from softrobots.cli.reports.equilibrium_report import equilibrium_answer
+from softrobots.cli.reports.robot_answers import equilibrium_answer
 from softrobots.model.actuators import joined_units, load_units
 from softrobots.model.loader import with_points
 from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feels, estimate_load

@@ -25,7 +25,7 @@ from softrobots.cli.options.output_files import (
 )
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
-from softrobots.cli.reports.motion_report import motion_answer
+from softrobots.cli.reports.robot_answers import motion_answer
 from softrobots.core.checks import FloatArray, finite_array, positive_number
 from softrobots.core.csv_table import Table, read_table
 from softrobots.core.errors import FileFormatError, NotConverged, ParameterError

@@ -10,7 +10,7 @@ from softrobots.cli.options.load_argument import add_environment, add_loads, loa
 from softrobots.cli.options.output_files import add_output, add_plot, check_files, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
-from softrobots.cli.reports.equilibrium_report import equilibrium_answer
+from softrobots.cli.reports.robot_answers import equilibrium_answer
 from softrobots.core.checks import finite_array
 from softrobots.core.errors import NeutralEquilibrium
 from softrobots.core.summary import Part, Table, text_of

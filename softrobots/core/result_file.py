@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from softrobots.core import npz_file
-from softrobots.core.errors import FileFormatError, ParameterError
+from softrobots.core.errors import FileFormatError, MissingDependency, ParameterError
 from softrobots.core.files import as_path, csv_text, new_file, write_atomically, write_text
 from softrobots.core.json_text import arrays_of_json, json_of_arrays
 from softrobots.core.npz_file import check_size, read_arrays
@@ -89,6 +89,27 @@ class Table(NamedTuple):
     """Numbers or words by the name of the column."""
     reading: dict[str, Any] | None
     """How they are read again, if the names do not say it."""
+
+
+def to_dataframe(result: Any) -> Any:
+    """Return a result as a `pandas.DataFrame`, with the rows and columns that `save_csv` writes.
+
+    How `Measurements.from_dataframe` reads a table of measurements again stands in its `attrs["columns"]`.
+
+    Args:
+        result: The result.
+
+    Raises:
+        ParameterError: If it is no table.
+        MissingDependency: If pandas is not installed (extra `pandas`).
+    """
+    columns, reading = table_of(result)
+    with MissingDependency.of_imports("pandas", "pandas"):
+        from pandas import DataFrame
+    frame = DataFrame(dict(columns))
+    if reading is not None:
+        frame.attrs["columns"] = reading
+    return frame
 
 
 def table_of(result: Any) -> Table:

@@ -16,9 +16,17 @@ from softrobots.compiled.chain.layout import Layout, TipLayout
 from softrobots.compiled.chain.plan import Plan
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import equilibrium_drivers as drivers
-from softrobots.compiled.drivers import guide_drivers, lane_drivers, motor_drivers, muscle_drivers, path_drivers, trigonometry
-from softrobots.compiled.program.looped_program import looped_program
-from softrobots.compiled.program.manual import manual
+from softrobots.compiled.drivers import (
+    guide_drivers,
+    lane_drivers,
+    motor_drivers,
+    muscle_drivers,
+    path_drivers,
+    response_drivers,
+    trigonometry,
+)
+from softrobots.compiled.program.looped_program import looped_program, looped_response
+from softrobots.compiled.program.manual import manual, on_a_line
 from softrobots.compiled.program.motor_program import force_blocks, target_blocks
 from softrobots.compiled.program.response_program import ResponsePlaces, response_blocks, response_functions
 from softrobots.compiled.program.unrolled_program import equilibrium_blocks
@@ -105,6 +113,26 @@ def make_program(
     text = module_text(docstring, _constants(unknowns, layout, size, lane_size, tables), blocks, loops, functions)
     lane_part = lane_text(lanes, lane_loops, lane_functions)
     return Program(text, lane_part, layout, size, tip, (*entries, *names), responses)
+
+
+def make_given_program(unknowns: Unknowns, *, weight: bool, inputs: TableInputs | None = None) -> Program:
+    """Generate the response of a looped chain to given loads and motions; see `softrobots.compiled.chain.looped_response`.
+
+    Args:
+        unknowns: The robot, whose chain is looped.
+        weight: Whether there is gravity.
+        inputs: Numbers of the robot that are inputs.
+    """
+    plan = Plan(unknowns, weight, inputs=inputs)
+    parts = looped_response(plan)
+    values: dict[str, object] = {name: value for name, value in vars(settings).items() if name.isupper()}
+    values |= plan.layout.constants() | parts.constants
+    values |= {"N_CONSTRAINTS": unknowns.n_constraints, "WORKSPACE_SIZE": parts.size, "LANE_SIZE": parts.size}
+    values |= {"LANES": lane_count(parts.size), "NUMBER_WEIGHTS": 0}
+    purpose = f"Response of {on_a_line(unknowns.chain.name)} to given loads and motions: generated code."
+    text = module_text(purpose, values, parts.blocks, [parts.loops()], [])
+    functions = [lane_drivers.load_block, lane_drivers.store_block, *functions_of(response_drivers)]
+    return Program(text, lane_text(parts.blocks, [parts.loops("_lanes")], functions), plan.layout, parts.size, parts.tip, ())
 
 
 def module_text(

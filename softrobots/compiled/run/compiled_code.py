@@ -6,8 +6,7 @@ import re
 from typing import Any, NamedTuple
 
 from softrobots.compiled.chain.unknowns import Unknowns
-from softrobots.compiled.program.generated_module import make_program
-from softrobots.compiled.program.given_program import make_given_program
+from softrobots.compiled.program.generated_module import make_given_program, make_program
 from softrobots.compiled.program.motion_program import make_motion_program
 from softrobots.compiled.run.backends import make_run
 from softrobots.compiled.trace.numbers import TableInputs

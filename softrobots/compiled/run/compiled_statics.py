@@ -9,14 +9,13 @@ import numpy as np
 
 from softrobots.compiled.run.actuation import Actuation
 from softrobots.compiled.run.batches import batch_rows, fail, gravity_vector, root, solve_batch, unusable, without
-from softrobots.compiled.run.certified import certified
 from softrobots.compiled.run.compiled_code import CompiledCode, SharedCode
 from softrobots.compiled.run.contact_batches import ContactSolver
 from softrobots.compiled.run.friction_states import StatesBefore, states_before
 from softrobots.compiled.run.results import CompiledEquilibrium, EquilibriumBatch
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, read_only
-from softrobots.core.errors import ParameterError
+from softrobots.core.errors import EquilibriumNotFound, ParameterError
 from softrobots.environment.environment import Environment
 from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel
@@ -26,6 +25,24 @@ NO_FORCE = read_only(np.zeros(3))
 DOUBLE = np.dtype(np.float64)
 """Type of the numbers of generated code."""
 _THREE = (3,)
+
+
+def certified(equilibrium: CompiledEquilibrium) -> CompiledEquilibrium:
+    """Return an equilibrium that is stable or neutral.
+
+    Raises:
+        EquilibriumNotFound: If its status says that it is not; carries it.
+    """
+    status = equilibrium.status
+    if status in (Status.CERTIFIED, Status.NEUTRAL):
+        return equilibrium
+    raise EquilibriumNotFound(
+        f"no certified equilibrium at motors {equilibrium.q_motors.tolist()} under {equilibrium.force.tolist()} N: "
+        f"{status.explanation}; {equilibrium.residual:.3g} N m are out of balance",
+        best=equilibrium,
+        residual=equilibrium.residual,
+        iterations=equilibrium.iterations,
+    )
 
 
 class CompiledStatics(CompiledCode):
