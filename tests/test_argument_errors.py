@@ -18,9 +18,8 @@ UNITS = {
     "inner_radius diameter outer_arc inner_arc arc arc_length object_radius deflection turn_height squeeze stopper gap spacing "
     "front lengths x y z reach positions tolerance",
     "m/rad": "pitch",
-    "m^3": "inflated_volume tank_volume",
     "rad": "angle bending azimuth azimuths offsets",
-    "Pa": "pressure young_modulus shear_modulus tank_pressure ambient_pressure",
+    "Pa": "pressure young_modulus shear_modulus",
     "N": "force axial_force",
     "N m": "moment max_moment slack_moment",
     "N m/rad": "stiffness",
@@ -127,8 +126,6 @@ QUARTER = 0.5 * math.pi
 
 # Call, argument, what is taken up to the limit, what is refused from there on, and how the limit is told.
 LIMITS: list[tuple[str, str, list[Any], list[Any], str]] = [
-    ("tank_volume", "tank_pressure", [up(3e4)], [3e4], "above the pressure 30000.0 Pa of the inflated volume"),
-    ("tank_volume", "ambient_pressure", [0.0, 5e-324], [-5e-324], "zero or positive [Pa]"),
     ("deflection", "poisson_ratio", [0.5, up(-1.0)], [up(0.5), -1.0, -1.5], "in (-1, 0.5]"),
     ("deflection", "position", [0.0, 0.6, [0.0, 0.6]], [up(0.6), -5e-324, [0.7, 0.1]], "within [0, 0.6] m, the length"),
     ("deflection", "wall_thickness", [0.1 * 0.055], [up(0.1 * 0.055)], "a thin wall, at most a tenth of the radius 0.055 m"),
@@ -231,9 +228,6 @@ NO_COMMON_SHAPE = [
     ("wrinkling_moment", "radius", "pressure"),
     ("required_pressure", "radius", "moment"),
     ("required_tabulated_pressure", "radius", "moment"),
-    ("inflated volume", "radius", "length"),
-    ("tank_volume", "tank_pressure", "pressure"),
-    ("tank_pressure", "tank_volume", "ambient_pressure"),
     ("moment", "stiffness", "angle"),
     ("moment", "max_moment", "angle"),
     ("deflection", "position", "young_modulus"),
@@ -285,8 +279,6 @@ def test_shapes_that_do_not_broadcast_are_told(call: str, name: str, other: str)
             "the stiffness due to the pressure alone (entry 1 is 0.001)",
         ),
         ("moment", "max_moment", [[20.0], [0.0]], "positive [N m] (entry (1, 0) is 0)"),
-        ("inflated volume", "length", [0.6, math.nan], "of finite numbers [m] (entry 1 is nan)"),
-        ("tank_volume", "tank_pressure", [3e7, 2e4], "above the pressure 30000.0 Pa of the inflated volume (entry 1 is 20000)"),
         ("BendingTest", "angle", [0.1, 2.0], "within +-pi/2 rad, both excluded (entry 1 is 2)"),
     ],
 )
@@ -299,8 +291,6 @@ def test_a_bad_entry_of_an_array_is_told_with_its_place(call: str, name: str, va
 
 # Call, argument, the value that the documentation names as its default.
 DEFAULTS = [
-    ("tank_volume", "ambient_pressure", 0.0),
-    ("tank_pressure", "ambient_pressure", 0.0),
     ("deflection", "poisson_ratio", 0.3),
     ("stiffness_from_young_modulus", "poisson_ratio", 0.3),
     ("young_modulus_from_stiffness", "poisson_ratio", 0.3),

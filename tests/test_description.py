@@ -454,6 +454,12 @@ def test_arm_computes_volume_and_tank() -> None:
     assert robot.tank_pressure(robot.tank_volume(30e6)) == pytest.approx(30e6, rel=1e-12)
     with pytest.raises(sr.ParameterError, match="the same in all links"):
         sr.InflatableArm(pressure=(50e3, 40e3)).tank_volume(30e6)
+    with pytest.raises(sr.ParameterError, match="above the pressure 50000"):
+        robot.tank_volume(50e3)
+    with pytest.raises(sr.ParameterError, match="tank_volume"):
+        robot.tank_pressure(0.0)
+    with pytest.raises(sr.ParameterError, match="ambient_pressure"):
+        robot.tank_pressure(1.0, ambient_pressure=-1.0)
 
 
 def test_colours_may_be_arrays() -> None:

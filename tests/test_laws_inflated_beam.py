@@ -17,7 +17,6 @@ from tests.support.laws import law
 
 BROADCASTING = ["wrinkling_moment", "required_pressure", "required_tabulated_pressure", "deflection", "moment"]
 BROADCASTING += ["stiffness_from_young_modulus", "young_modulus_from_stiffness"]
-BROADCASTING += ["inflated volume", "tank_volume", "tank_pressure"]
 BROADCASTING += ["beam_stiffness", "two_hinges", "moment_limits", "slack_wall_moment"]
 ROUNDING = 1e-14  # a few dozen operations on positive numbers
 
@@ -357,31 +356,3 @@ def test_small_angles_are_the_limit(test: Any, angle: float, force: float) -> No
     assert float(bent) == pytest.approx(angle, abs=0.5 * angle**2 + abs(angle) ** 3 + ROUNDING * abs(angle))
     allowed = (1.01 * abs(angle) + 1e-15) * abs(force) * test.arm
     assert float(moment) == pytest.approx(float(test.moment(moved, force)), abs=allowed)
-
-
-# --- Inflation
-
-
-@law("inflated_beam.volume")
-@settings(max_examples=20)
-@given(decades(1e-3, 1e3), decades(1e-3, 1e3), decades(1e-3, 1e3))
-def test_volume_adds_up_along_the_tube(one: float, two: float, radius: float) -> None:
-    parts = inflated_beam.volume(one, radius) + inflated_beam.volume(two, radius)
-    assert parts == pytest.approx(inflated_beam.volume(one + two, radius), rel=ROUNDING)
-    assert inflated_beam.volume(one, 2.0 * radius) == 4.0 * inflated_beam.volume(one, radius)
-
-
-@law("inflated_beam.tank_volume", "inflated_beam.tank_pressure")
-@settings(max_examples=40)
-@given(decades(1e-6, 1e3), decades(1.0, 1e8), decades(1e-6, 1e6), st.one_of(st.just(0.0), decades(1.0, 1e6)), factors_)
-def test_a_tank_keeps_its_gas(volume: float, p: float, more: float, ambient: float, size: float) -> None:
-    """Boyle: absolute pressure times volume is the same before, in the tank, and after, in tank and tubes."""
-    full = p * (1.0 + more)
-    tank = inflated_beam.tank_volume(volume, p, full, ambient_pressure=ambient)
-    assert (full + ambient) * tank == pytest.approx((p + ambient) * (tank + volume), rel=ROUNDING / min(more, 1.0))
-    again = inflated_beam.tank_pressure(volume, p, tank, ambient_pressure=ambient)
-    assert again == pytest.approx(full, rel=ROUNDING / min(more, 1.0))
-    assert inflated_beam.tank_volume(size * volume, p, full, ambient_pressure=ambient) == pytest.approx(
-        size * tank, rel=ROUNDING
-    )
-    assert inflated_beam.tank_volume(volume, p, 2.0 * full, ambient_pressure=ambient) < tank  # more pressure, less tank

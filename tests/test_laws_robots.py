@@ -18,7 +18,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
-from softrobots import export, inflated_beam
+from softrobots import export
 from softrobots.cli.options import command_line
 from studies.shared.command_line import add_resume, serve
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
@@ -33,9 +33,9 @@ lengths_ = st.lists(st.floats(0.2, 1.0), min_size=1, max_size=4)
 
 @law("InflatableArm", "ROBOTS")
 @settings(max_examples=25)
-@given(lengths_, st.floats(0.02, 0.1), st.floats(0.01, 0.1), st.floats(1e3, 1e6), st.floats(2.0, 100.0))
+@given(lengths_, st.floats(0.02, 0.1), st.floats(0.01, 0.1), st.floats(1e3, 1e6), st.floats(2.0, 100.0), st.floats(0.0, 1e6))
 def test_one_number_is_that_number_for_every_link(
-    lengths: list[float], radius: float, thin: float, p: float, full: float
+    lengths: list[float], radius: float, thin: float, p: float, full: float, ambient: float
 ) -> None:
     """An arm is the sum of its links, and its tank that of them all; names lead to the same robots."""
     one = {"radius": radius, "wall_thickness": thin * radius, "pressure": p}
@@ -45,10 +45,10 @@ def test_one_number_is_that_number_for_every_link(
     assert arm.n_links == len(lengths)
     alone = [sr.InflatableArm(link_lengths=(length,), **one) for length in lengths]
     assert arm.volume == pytest.approx(sum(link.volume for link in alone), rel=1e-14)
-    tank = arm.tank_volume(full * p)
-    assert tank == pytest.approx(sum(link.tank_volume(full * p) for link in alone), rel=1e-13)
-    assert tank == inflated_beam.tank_volume(arm.volume, p, full * p)
-    assert arm.tank_pressure(tank) == pytest.approx(full * p, rel=1e-13)
+    tank = arm.tank_volume(full * p, ambient_pressure=ambient)
+    assert tank == pytest.approx(sum(link.tank_volume(full * p, ambient_pressure=ambient) for link in alone), rel=1e-13)
+    assert (full * p + ambient) * tank == pytest.approx((p + ambient) * (tank + arm.volume), rel=1e-13)  # the gas is kept
+    assert arm.tank_pressure(tank, ambient_pressure=ambient) == pytest.approx(full * p, rel=1e-13)
     assert sr.ROBOTS["inflatable_arm"] is sr.InflatableArm
 
 

@@ -1,4 +1,4 @@
-"""One inflated link as a beam: bending and wrinkling, characterisation data, inflation; [Troise 2021] section 2.1."""
+"""One inflated link as a beam: bending and wrinkling, characterisation data; [Troise 2021] section 2.1."""
 
 from softrobots.inflated_beam.beam import (
     POISSON_RATIO,
@@ -22,7 +22,6 @@ from softrobots.inflated_beam.characterisation import (
     required_tabulated_pressure,
 )
 from softrobots.inflated_beam.characterisation_fit import Characterisation, fit_characterisation
-from softrobots.inflated_beam.inflation import tank_pressure, tank_volume, volume
 from softrobots.inflated_beam.membrane_tube import MomentLimits, SlackWallMoment, moment_limits, slack_wall_moment
 from softrobots.inflated_beam.two_hinges import TwoHinges, two_hinges
 
@@ -49,10 +48,7 @@ __all__ = [
     "required_tabulated_pressure",
     "slack_wall_moment",
     "stiffness_from_young_modulus",
-    "tank_pressure",
-    "tank_volume",
     "two_hinges",
-    "volume",
     "wrinkling_moment",
     "young_modulus_from_stiffness",
 ]

@@ -10,7 +10,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 
 from softrobots import inflated_beam
-from softrobots.core.checks import FloatArray
+from softrobots.core.checks import FloatArray, non_negative_number, positive_number
 from softrobots.core.errors import ParameterError
 from softrobots.description.urdf_tags import MOMENT_LAWS
 from softrobots.robots.field_values import questionable
@@ -228,26 +228,27 @@ class InflatedLinks(XacroRobot):
     @property
     def volume(self) -> float:
         """Volume of all links together [m^3]."""
-        return float(inflated_beam.volume(self.link_lengths, self._each("radius")).sum())
+        return float(np.sum(np.pi * np.square(self._each("radius")) * self.link_lengths))
 
     def tank_volume(self, tank_pressure: float, *, ambient_pressure: float = 0.0) -> float:
-        """Volume of the tank that inflates the whole arm once, isothermally [m^3]; see `inflated_beam.tank_volume`.
+        """Volume of the tank that inflates the whole arm once [m^3]: `(p_tank + p_a) V_tank = (p + p_a) (V_tank + V)` (Boyle).
 
-        A tank serves all links at once, so they must have the same pressure.
+        A tank serves all links at once, which are empty before, so they must have the same pressure.
 
         Args:
-            tank_pressure: Gauge pressure of the full tank [Pa].
-            ambient_pressure: Absolute pressure outside [Pa]; 0 in space (the default).
+            tank_pressure: Gauge pressure of the full tank, above that of the links [Pa]. The paper mentions 30 MPa.
+            ambient_pressure: Absolute pressure outside [Pa]; 0 in space (the default), 101325 on the ground.
 
         Raises:
             ParameterError: If the links differ in pressure or a pressure is out of range.
         """
-        return float(
-            inflated_beam.tank_volume(self.volume, self._one_pressure(), tank_pressure, ambient_pressure=ambient_pressure)
-        )
+        (pressure, ambient), full = self._pressures(ambient_pressure), positive_number("tank_pressure", tank_pressure, "Pa")
+        if full <= pressure:
+            raise ParameterError("tank_pressure", tank_pressure, f"above the pressure {pressure} Pa of the links")
+        return (pressure + ambient) * self.volume / (full - pressure)
 
     def tank_pressure(self, tank_volume: float, *, ambient_pressure: float = 0.0) -> float:
-        """Gauge pressure of a full tank that inflates the whole arm once [Pa]; see `inflated_beam.tank_pressure`.
+        """Gauge pressure of a full tank that inflates the whole arm once, the inverse of `tank_volume` [Pa].
 
         Args:
             tank_volume: Volume of the tank [m^3].
@@ -256,18 +257,17 @@ class InflatedLinks(XacroRobot):
         Raises:
             ParameterError: If the links differ in pressure or a value is out of range.
         """
-        return float(
-            inflated_beam.tank_pressure(self.volume, self._one_pressure(), tank_volume, ambient_pressure=ambient_pressure)
-        )
+        (pressure, ambient), tank = self._pressures(ambient_pressure), positive_number("tank_volume", tank_volume, "m^3")
+        return pressure + (pressure + ambient) * self.volume / tank
 
     def _tubes(self) -> dict[str, FloatArray]:
         return {name: np.array(self._each(name)) for name in ("pressure", "radius", "wall_thickness")}
 
-    def _one_pressure(self) -> float:
+    def _pressures(self, ambient_pressure: float) -> tuple[float, float]:
         pressures = self._each("pressure")
         if len(set(pressures)) != 1:
             raise ParameterError("pressure", pressures, "the same in all links to be filled from one tank")
-        return float(pressures[0])
+        return float(pressures[0]), non_negative_number("ambient_pressure", ambient_pressure, "Pa")
 
     def _check_springs(self) -> None:
         if self.stiffness is not None and self.young_modulus is not None:

@@ -87,15 +87,6 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
         inflated_beam.fit_characterisation,
         {"angle": BENT, "moment": np.minimum(170.0 * BENT, 20.0), "pressure": 3e4, "radius": 0.055},
     ),
-    "inflated volume": (inflated_beam.volume, {"length": 0.6, "radius": 0.05}),
-    "tank_volume": (
-        inflated_beam.tank_volume,
-        {"inflated_volume": 0.01, "pressure": 3e4, "tank_pressure": 3e7, "ambient_pressure": 0.0},
-    ),
-    "tank_pressure": (
-        inflated_beam.tank_pressure,
-        {"inflated_volume": 0.01, "pressure": 3e4, "tank_volume": 1e-4, "ambient_pressure": 0.0},
-    ),
     "BendingTest": (
         _whole_test,
         {"probe_distance": 0.5, "hinge_offset": 0.03, "offset": 0.06, "angle": 0.1, "displacement": 0.05, "force": 10.0},
