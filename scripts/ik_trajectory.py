@@ -21,6 +21,7 @@ import pinocchio as pin
 import softrobots as sr
 from softrobots import inflated_beam
 from softrobots.cli.options.command_line import add_load, exit_status, gravity_of
+from softrobots.core.checks import positive_number
 from softrobots.core.files import make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import METHODS
@@ -83,7 +84,8 @@ def run(arguments: argparse.Namespace) -> Path:
     if not arguments.no_plots:
         canvas.require_matplotlib()  # tells at once what is missing
     wrist = None if arguments.wrist is None else tuple(arguments.wrist) or WRIST
-    model = sr.load_model(sr.InflatableArm(stiffness=arguments.stiffness, pressure=arguments.pressure, wrist=wrist))
+    pressure = positive_number("--pressure", arguments.pressure, "Pa")  # without it there is no wrinkling margin
+    model = sr.load_model(sr.InflatableArm(stiffness=arguments.stiffness, pressure=pressure, wrist=wrist))
     Load.of(model, arguments.force, gravity=gravity)
     folder = free_folder(arguments.output or Path("output") / f"ik_trajectory_{datetime.now():%Y%m%d_%H%M%S}")
 
