@@ -417,14 +417,12 @@ def test_defaults_are_those_of_the_robots(answer) -> None:
 
 
 @pytest.mark.study
-def test_bench_times_every_job_and_writes_what_it_prints(told, tmp_path: Path) -> None:
-    file = tmp_path / "bench.json"
-    words = ["bench", "--quick", "--rounds", "2", "-o", str(file)]
-    status, out, err = told(*words)
+def test_bench_times_every_job(told) -> None:
+    words = ["bench", "--quick", "--rounds", "2"]
+    status, out, err = told(*words, "--json")
     assert status == 0
     assert "/5 [" in err  # a progress bar
-    assert out.endswith(f"{file}: written\n")
-    results = json.loads(file.read_text(encoding="utf-8"))
+    results = json.loads(out)
     assert results["machine"]["softrobots"] == sr.__version__
     assert results["machine"]["backend"] == available_backend()
     assert [row["job"] for row in results["rows"]] == list(bench.JOBS)
@@ -432,13 +430,9 @@ def test_bench_times_every_job_and_writes_what_it_prints(told, tmp_path: Path) -
         assert row["compiled_seconds"] > 0.0
         assert row["pinocchio_seconds"] > 0.0
         assert row["low"] <= row["ratio"] <= row["high"]
-        costs = (f"{1e6 * row[name]:.3g}" for name in ("compiled_seconds", "pinocchio_seconds"))
-        assert re.search(rf"^{row['job']} +{' +'.join(map(re.escape, costs))} ", out, re.M)
-    assert told(*words) == (2, "", f"error: {file} exists; choose another name or allow overwriting\n")
-    status, out, _ = told(*words, "--overwrite", "--json", "--only", "batch", "gravity")
+    status, out, _ = told(*words, "--only", "batch", "gravity")
     assert status == 0
-    assert json.loads(out) == json.loads(file.read_text(encoding="utf-8"))
-    assert [row["job"] for row in json.loads(out)["rows"]] == ["gravity", "batch"]
+    assert re.findall(r"^([a-z]+) +\S+ +\S+ +\S+ \(\S+ to \S+\)$", out, re.M) == ["gravity", "batch"]
 
 
 @pytest.mark.study
@@ -466,14 +460,11 @@ def test_bench_takes_each_ratio_within_its_round(monkeypatch: pytest.MonkeyPatch
     assert row == bench.Row("batch", 2e-4, 8e-4, pytest.approx(4.0), pytest.approx(4.0), pytest.approx(4.0))
 
 
-@pytest.mark.parametrize(
-    ("words", "message"), [(["--rounds", "0"], "--rounds must be at least 1"), (["-o", "."], "is a folder")]
-)
-def test_bench_refuses(words: list[str], message: str, told, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_bench_refuses_no_rounds(told, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(bench, "measure", None)  # nothing is measured before
-    status, out, err = told("bench", *words)
+    status, out, err = told("bench", "--rounds", "0")
     assert (status, out) == (2, "")
-    assert message in err
+    assert "--rounds must be at least 1" in err
 
 
 def test_bench_help_names_the_jobs_and_the_other_benchmark(capsys: pytest.CaptureFixture) -> None:

@@ -4,22 +4,19 @@ from __future__ import annotations
 
 import argparse
 import functools
-import json
 import math
 import platform
 import time
 import timeit
 from collections.abc import Callable, Mapping
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from softrobots.cli.reports.answers import add_json, print_answer, written_lines
+from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.compiled.run.compiled_model import CompiledModel, compile_model
 from softrobots.core.errors import ParameterError
-from softrobots.core.files import new_file, write_text
 from softrobots.core.progress import with_progress
 from softrobots.core.summary import aligned
 from softrobots.model.loader import load_model
@@ -41,7 +38,7 @@ _LEAST_TIME = 0.02  # [s], a run is repeated until it takes this long
 _EXAMPLES = f"""examples:
   softrobots bench                                   every job, a quarter of a minute
   softrobots bench --only estimation trajectory      some jobs
-  softrobots bench -o mine.json                      also as a file
+  softrobots bench --json > mine.json                for a machine
 
 Jobs for --only: {", ".join(JOBS)}.
 
@@ -91,8 +88,6 @@ def add_parser(subparsers: Any) -> None:
     parser.add_argument("--only", nargs="+", choices=JOBS, default=JOBS, metavar="JOB", help="run these jobs (all)")
     parser.add_argument("--quick", action="store_true", help=f"{_QUICK_CASES} cases instead of {_CASES}: a trial run")
     parser.add_argument("--rounds", type=int, default=5, metavar="N", help="rounds of each job [-] (%(default)s)")
-    parser.add_argument("-o", "--output", type=Path, metavar="FILE.json", help="also write the results to a new file (none)")
-    parser.add_argument("--overwrite", action="store_true", help="allow FILE to be replaced")
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -101,8 +96,6 @@ def run(arguments: argparse.Namespace) -> None:
     """Measure the jobs and print the table."""
     if arguments.rounds < 1:
         raise ParameterError("--rounds", arguments.rounds, "at least 1")
-    if arguments.output is not None:
-        new_file(arguments.output, overwrite=arguments.overwrite)  # refused before the work
     model = load_model(InflatableArm())
     compiled = compile_model(model)
     jobs = prepare_jobs(model, compiled, _QUICK_CASES if arguments.quick else _CASES)
@@ -114,10 +107,8 @@ def run(arguments: argparse.Namespace) -> None:
     for row in rows:
         costs = (f"{1e6 * row.compiled_seconds:.3g}", f"{1e6 * row.pinocchio_seconds:.3g}")
         table.append((row.job, *costs, f"{row.ratio:.3g} ({row.low:.3g} to {row.high:.3g})"))
-    text, file = json.dumps(answer, indent=1) + "\n", arguments.output
-    files = [] if file is None else [write_text(file, text, overwrite=arguments.overwrite)]
     head = f"{', '.join(f'{name} {value}' for name, value in machine.items())}; compiled by {compiled.backend}"
-    print_answer(arguments, answer, [head, "", *aligned(table), *written_lines(files)])
+    print_answer(arguments, answer, [head, "", *aligned(table)])
 
 
 def prepare_jobs(model: SoftModel, compiled: CompiledModel, count: int) -> Mapping[str, Job]:
