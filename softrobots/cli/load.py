@@ -20,8 +20,8 @@ from softrobots.cli.reports.answers import Fact, add_json, answer_of, attributes
 from softrobots.cli.reports.robot_answers import equilibrium_answer
 from softrobots.model.actuators import joined_units, load_units
 from softrobots.model.loader import with_points
+from softrobots.statics.equilibrium_summary import unit_per_newton
 from softrobots.statics.load_estimation import METHODS, LoadEstimate, check_feels, estimate_load
-from softrobots.statics.load_summary import unit_per_newton
 
 _EXAMPLES = """examples:
   softrobots load inflatable_arm --motors 0.3 0.6 -0.8 --torques 10.193 -16.605 -7.675

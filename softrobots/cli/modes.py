@@ -12,8 +12,8 @@ from softrobots.cli.options.robot_argument import add_model, add_motors, motors_
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.checks import positive_integer
 from softrobots.core.summary import text_of
+from softrobots.dynamics.motion_summary import modes_parts
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
-from softrobots.dynamics.vibration_summary import modes_parts
 from softrobots.model.actuators import load_units
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.view.figures.vibrations import mode_shapes

@@ -31,8 +31,8 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, one_each, positive_integer, positive_number, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.core.summary import Part, Summarised
+from softrobots.dynamics.motion_summary import modes_parts
 from softrobots.dynamics.small_motion import check_vibrates, mass_factor, small_motion
-from softrobots.dynamics.vibration_summary import modes_parts
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.contact.certificate import null_space
 from softrobots.statics.elastic_state import scaled

@@ -18,8 +18,17 @@ from softrobots.environment.environment import Environment
 from softrobots.export.damping import DampingRule
 from softrobots.export.meshes import MeshFiles, MeshFolder, drake_collides, drawn_anywhere
 from softrobots.export.prepared import PreparedRobot, neighbours, prepare, weld_groups
-from softrobots.export.sdf_contact import HARDNESS, write_hardness, write_obstacles
-from softrobots.export.sdf_parts import DRAKE, WORLD, write_colour, write_geometry, write_number, write_pose
+from softrobots.export.sdf_parts import (
+    DRAKE,
+    HARDNESS,
+    WORLD,
+    write_colour,
+    write_geometry,
+    write_hardness,
+    write_number,
+    write_obstacles,
+    write_pose,
+)
 from softrobots.export.xml_text import document
 from softrobots.model.soft_model import SoftModel
 
@@ -56,7 +65,7 @@ def to_sdf(
 
     In an environment, the file is a world of two models, the robot and its surroundings, a link with the name of each obstacle.
     The capsules of the robot touch them, in place of the collision shapes of the URDF (`softrobots.export.contact_shapes`);
-    `softrobots.export.sdf_contact` says how stiff.
+    `softrobots.export.sdf_parts` says how stiff.
 
     Args:
         model: The robot.

@@ -23,7 +23,7 @@ from softrobots.model.friction_coordinates import check_frictionless
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.elastic_state import elastic_state
 from softrobots.statics.equilibrium import Equilibrium, equilibrium_from_state, from_before
-from softrobots.statics.load_summary import load_parts
+from softrobots.statics.equilibrium_summary import load_parts
 from softrobots.statics.loads import Load
 from softrobots.statics.tip_force.force_search import ANY
 from softrobots.statics.tip_force.friction_range import friction_range

@@ -9,7 +9,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import NotConverged
-from softrobots.export.sdf_contact import SURROUNDINGS
+from softrobots.export.sdf_parts import SURROUNDINGS
 from studies.interop.newton import balance_point
 from studies.interop.outcomes import ITSELF, SECONDS, Outcome, Question
 from studies.interop.tools import find_tool
