@@ -314,14 +314,15 @@ def test_modes_are_saved_drawn_and_played(tmp_path: Path, capsys: pytest.Capture
     """The command writes what the library finds; a saved result is computed again, and refused if it claims something else."""
     asked = ["modes", "inflatable_arm", "--motors", "0.3", "0.6", "-0.8", "--gravity", "--damping-time", "0.01"]
     asked += ["--servo-stiffness", "900", "--count", "2"]
-    files = [str(tmp_path / name) for name in ("modes.npz", "modes.png")]
-    assert cli.main([*asked, "-o", files[0], "--plot", files[1], "--json"]) == 0
+    files = [str(tmp_path / name) for name in ("modes.npz", "modes.png", "modes.html")]
+    assert cli.main([*asked, "-o", files[0], "--plot", files[1], "--page", files[2], "--json"]) == 0
     answer = json.loads(capsys.readouterr().out)
     arm = model("arm")
     found = sr.solve_equilibrium(arm, (0.3, 0.6, -0.8), gravity=sr.EARTH_GRAVITY)
     modes = sr.vibration_modes(arm, found, damping_time=0.01, servo_stiffness=900.0)
     assert answer["frequencies"] == modes.frequencies.tolist()
-    assert [Path(file).name for file in answer["files"]] == ["modes.npz", "modes.png"]
+    assert [Path(file).name for file in answer["files"]] == ["modes.npz", "modes.png", "modes_1.html", "modes_2.html"]
+    assert "mode 2" in (tmp_path / "modes_2.html").read_text(encoding="utf-8")
     assert cli.main(["view", "--result", files[0], "--html", str(tmp_path / "view.html")]) == 0
     assert f"mode 1 of 7, {modes.frequencies[0]:.4g} Hz" in capsys.readouterr().out
     saved = sr.load_result(files[0])

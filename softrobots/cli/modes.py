@@ -3,24 +3,34 @@
 from __future__ import annotations
 
 import argparse
+from pathlib import Path
 from typing import Any
 
 from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
-from softrobots.cli.options.output_files import add_output, add_plot, check_files, save, write_plot
+from softrobots.cli.options.output_files import (
+    add_output,
+    add_plot,
+    check_ending,
+    check_files,
+    save,
+    write_plot,
+)
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, one_or_each, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.checks import positive_integer
+from softrobots.core.files import new_file
 from softrobots.core.summary import text_of
 from softrobots.dynamics.motion_summary import modes_parts
 from softrobots.dynamics.vibration import VibrationModes, vibration_modes
 from softrobots.model.actuators import load_units
 from softrobots.statics.equilibrium import solve_equilibrium
-from softrobots.view.figures.vibrations import mode_shapes
+from softrobots.view.figures.vibrations import SWING, mode_shapes
+from softrobots.view.viewer import Viewer
 
 _EXAMPLES = """examples:
   softrobots modes inflatable_arm --motors 0.3 0.6 -0.8 --gravity --plot modes.png
-  softrobots modes pcc_arm --gravity --count 4 -o modes.npz             softrobots view --result modes.npz shows the slowest
+  softrobots modes pcc_arm --gravity --count 4 --page modes.html        modes_1.html to modes_4.html
   softrobots modes inflatable_arm --gravity --servo-stiffness 2000 --set rotor_inertia=0.05 -o modes.csv
 """
 
@@ -42,10 +52,12 @@ def add_parser(subparsers: Any) -> None:
     add_damping(parser)
     help_text = "stiffness with which motors hold their place, one for all or one for each [N m/rad or N/m] (they are held)"
     add_numbers(parser, "--servo-stiffness", "K", help_text, nargs="+")
-    help_text = "how many modes are shown and drawn, slowest first [-] (%(default)s)"
+    help_text = "how many modes are shown, drawn and animated, slowest first [-] (%(default)s)"
     parser.add_argument("--count", type=int, default=6, metavar="N", help=help_text)
     add_output(parser, "all modes")
     add_plot(parser, "the shapes of the modes")
+    help_text = "write an animated page of each mode, FILE_1.html and so on, in slow motion; they work offline (none)"
+    parser.add_argument("--page", type=Path, metavar="FILE.html", help=help_text)
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -55,6 +67,7 @@ def run(arguments: argparse.Namespace) -> None:
     check_files(arguments)
     positive_integer("--count", arguments.count)
     model = statics_model_of(arguments)
+    pages = _pages(arguments, model.n_springs)
     placed = slice(model.actuators.n_placed)
     coordinates = model.actuators.units[placed]
     units = [f"{load}/{coordinate}" for load, coordinate in zip(load_units(coordinates), coordinates, strict=True)]
@@ -68,7 +81,24 @@ def run(arguments: argparse.Namespace) -> None:
         servo_stiffness=servos,
     )
     files = save(arguments, modes) + write_plot(arguments, lambda: mode_shapes(modes, shown=arguments.count))
-    print_answer(arguments, _answer(modes), text_of(modes_parts(modes, arguments.count), None), files)
+    pages = pages[: len(modes.frequencies)]
+    if pages:
+        with Viewer(model) as viewer:
+            for mode, page in enumerate(pages, start=1):
+                viewer.animate(modes.swing(mode, SWING * model.reach))
+                title = f"{model.pinocchio.name}, mode {mode}, {modes.frequencies[mode - 1]:.4g} Hz"
+                viewer.write_html(page, title=title, overwrite=arguments.overwrite)
+    print_answer(arguments, _answer(modes), text_of(modes_parts(modes, arguments.count), None), files + pages)
+
+
+def _pages(arguments: argparse.Namespace, modes: int) -> list[Path]:
+    """A page for each mode that is shown, refused before the work if it cannot be written."""
+    page: Path | None = arguments.page
+    if page is None:
+        return []
+    check_ending("--page", page, ".html")
+    files = [page.with_stem(f"{page.stem}_{number}") for number in range(1, min(arguments.count, modes) + 1)]
+    return [new_file(file, overwrite=arguments.overwrite) for file in files]
 
 
 def _answer(modes: VibrationModes) -> dict[str, Any]:
