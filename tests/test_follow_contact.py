@@ -307,6 +307,33 @@ def test_a_tube_grows_past_an_obstacle() -> None:
     assert any(event.kind == "made" for event in path.events)
 
 
+@pytest.mark.study
+def test_a_tube_that_grows_while_it_presses_keeps_its_forces() -> None:
+    """Sections of the longer tube have other ends: forces go over to them, or every step would have to find them anew.
+
+    Then steps were halved without end as the force rose: they are counted by the lengths that are asked.
+    """
+    tube, asked = sr.HelixTube(length=0.5, elastic_sections=10), list[float]()
+
+    def grown(length: float) -> sr.SoftModel:
+        asked.append(length)
+        return sr.load_model(tube.grown(length))
+
+    middle = sr.solve_equilibrium(grown(0.56), []).tip_position
+    ball = sr.Environment([sr.Sphere(0.02, position=middle + (0.0, 0.0, 0.04))])
+    start = sr.solve_equilibrium(grown(0.605), [], environment=ball)
+    path = sr.follow_contact(grown, [], environment=ball, friction=0.3, parameters=[0.605, 0.615, 0.62], start=start)
+    assert not path.jumps
+    assert len(asked) < 60  # 21
+    assert np.all(np.diff(path.dissipation) >= 0.0)
+    for state in path.equilibria:
+        (contact,) = (one for one in state.contacts if one.strict)
+        assert abs(contact.gap) < 1e-9 * state.model.reach
+        across = contact.force - contact.normal_force * contact.normal
+        assert np.linalg.norm(across) <= 0.3 * contact.normal_force * (1 + 1e-8)  # CONE of the solver, and rounding
+        assert state.residual <= state.tolerance
+
+
 def test_a_path_is_saved_and_loaded_with_its_friction(tmp_path: Path) -> None:
     path = sr.follow_contact(block(), [[0.0], [0.1], [0.05]], (0, 0, -10.0), environment=FLOOR, friction=0.3)
     for suffix in ("npz", "json"):

@@ -47,10 +47,13 @@ class Sliding:
 
 
 def forces_of(gaps: Gaps, contacts: tuple[Contact, ...]) -> dict[Any, tuple[float, FloatArray]]:
-    """Return `Sliding.forces` of the contacts of an equilibrium, on the nearest candidates."""
-    nearest = [int(np.linalg.norm(gaps.points - one.point, axis=1).argmin()) for one in contacts]
-    parts = ((one.normal_force, one.force - one.normal_force * one.normal) for one in contacts)
-    return {gaps.keys[row]: part for row, part in zip(nearest, parts, strict=True)}
+    """Return `Sliding.forces` of the contacts of an equilibrium, on the nearest candidates, if there are any."""
+    forces: dict[Any, tuple[float, FloatArray]] = {}
+    for one in contacts if len(gaps) else ():
+        key = gaps.keys[int(np.linalg.norm(gaps.points - one.point, axis=1).argmin())]
+        normal, friction = forces.get(key, (0.0, np.zeros(3)))
+        forces[key] = normal + one.normal_force, friction + one.force - one.normal_force * one.normal
+    return forces
 
 
 def world(tangents: FloatArray, parts: FloatArray) -> FloatArray:

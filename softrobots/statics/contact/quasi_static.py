@@ -223,7 +223,7 @@ def carried_over(given: Given, last: Rest) -> tuple[Sliding, FloatArray]:
     """Return what friction remembers and the elastic coordinates in the robot given, which may have grown since.
 
     What has everted does not move along the tube: each place of the longer robot keeps the strains that it had, measured from
-    the base; what is new at its tip is at rest.
+    the base; what is new at its tip is at rest. Forces stay where they press: on the candidate that is nearest now.
     """
     model, before = given.model, last.robot.model
     if model == before:
@@ -232,7 +232,7 @@ def carried_over(given: Given, last: Rest) -> tuple[Sliding, FloatArray]:
     given_before = last.robot.given
     joints = model.coordinates.at(given_before.q_motors, springs).joints
     there = Surroundings(model, given_before.environment).at(model.embed(joints), MARGIN * model.reach)
-    return Sliding(last.sliding.friction, there), springs
+    return Sliding(last.sliding.friction, there, forces_of(there, last.robot.touches(last.found))), springs
 
 
 def grown_springs(model: SoftModel, before: SoftModel, q_springs: FloatArray) -> FloatArray:
