@@ -13,6 +13,7 @@ import pinocchio as pin
 import pytest
 import trimesh
 from scipy.optimize import minimize, minimize_scalar
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 import softrobots as sr
@@ -229,6 +230,49 @@ def test_two_faces_that_meet_at_a_corner_alone_are_a_corner() -> None:
         assert distance[0] == pytest.approx(np.linalg.norm(away), abs=1e-15)
         expected = (np.eye(3) - np.outer(normal[0], normal[0])) / distance[0]
         assert np.allclose(sum(weight * np.outer(a, a) for a, weight in bends), expected, atol=1e-12)
+
+
+def test_a_mesh_of_a_box_is_the_box_on_faces_edges_corners_and_borders(rng: np.random.Generator) -> None:
+    """Eight corners, and the same with faces of many triangles, against the closed form of the box in other code."""
+    half = np.array([0.3, 0.2, 0.15])
+    grid = np.array([x for x in itertools.product(*([np.linspace(-1, 1, 5)] * 3)) if np.abs(x).max() == 1.0])
+    box = sr.Box(2.0 * half, POSITION, ROTATION)
+    transform = box.transform_to_world
+    shares = rng.uniform(-2.0, 2.0, (400, 3))
+    on_borders = np.where(rng.random((400, 3)) < 0.4, np.sign(shares), shares)
+    local = np.concatenate([shares, on_borders]) * half
+    points, ways = local @ transform[:3, :3].T + transform[:3, 3], rng.normal(size=(800, 3))
+    outside = (np.abs(local) > (1.0 + 1e-9) * half).any(axis=1)
+    which = np.zeros(800, dtype=int)
+    ((field, _),) = obstacle_fields(sr.Environment([box]))
+    distances, normals, bends = field.along(points, which, ways)
+    for corners in (grid[(np.abs(grid) == 1.0).all(axis=1)], grid):
+        ((mesh, _),) = obstacle_fields(sr.Environment([sr.Mesh(corners * half, POSITION, ROTATION)]))
+        found = mesh.along(points, which, ways)
+        assert np.abs(found[0] - distances).max() < 1e-14
+        assert np.abs(found[1] - normals)[outside].max() < 1e-12  # inside there may be two nearest faces
+        assert np.abs(found[2] - bends)[outside].max() < 1e-9 * np.abs(bends).max()
+        for row in range(400, 800, 10):
+            given = tuple(points[row]), float(distances[row]), tuple(normals[row])
+            one = sum(weight * (ways[row] @ a) ** 2 for a, weight in mesh.bends(0, *given))
+            assert one == pytest.approx(found[2][row], rel=1e-9, abs=1e-9)
+
+
+def test_nearest_points_of_random_polyhedra_are_projections(rng: np.random.Generator) -> None:
+    """The foot is on the body, and the body is beyond the plane there: that is the nearest point of a convex body."""
+    for count in (4, 12, 300):
+        corners = rng.normal(size=(count, 3))
+        corners /= np.linalg.norm(corners, axis=1)[:, None] if count == 300 else 1.0
+        hull = ConvexHull(corners + 5.0)  # away from its own origin
+        ((field, _),) = obstacle_fields(sr.Environment([sr.Mesh(corners + 5.0, hull=True)]))
+        points = rng.normal(size=(500, 3)) * 2.0 + 5.0
+        distances, normals = field.at(points, np.zeros(500, dtype=int))
+        depths = (points @ hull.equations[:, :3].T + hull.equations[:, 3]).max(axis=1)
+        assert np.abs(distances - depths)[depths < 0.0].max(initial=0.0) < 1e-13
+        feet, out = points - distances[:, None] * normals, depths > 0.0
+        assert (feet @ hull.equations[:, :3].T + hull.equations[:, 3])[out].max() < 1e-13
+        beyond = np.vecdot(feet, normals)[:, None] - normals @ (corners.T + 5.0)
+        assert beyond[out].min() > -1e-12  # a border counts 1e-9 of the distance as on it, across the normal
 
 
 @pytest.mark.study

@@ -10,7 +10,7 @@ from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, positive_array, read_only
+from softrobots.core.checks import FloatArray, finite_array, positive_array
 from softrobots.core.errors import FileFormatError, ParameterError
 from softrobots.description.mesh_files import LARGEST_MESH, find_mesh
 from softrobots.environment.obstacles import NO_TURN, Obstacle
@@ -35,10 +35,14 @@ class Hull(NamedTuple):
     """Offsets of their planes: inside, `normals @ x <= offsets`; shape (f,) [m]."""
     edges: Any
     """Corners at the ends of each edge between different faces, shape (e, 2), integers."""
+    along: FloatArray
+    """Direction of each edge, shape (e, 3)."""
+    lengths: FloatArray
+    """Length of each edge, shape (e,) [m]."""
     outward: FloatArray
-    """In each of the two faces at an edge, the direction out of the face across the edge, shape (e, 2, 3)."""
+    """In each of the two faces at an edge, the direction out of the face across the edge, shape (2, e, 3)."""
     sides: Any
-    """Triangles at the edge, shape (e, 2), integers."""
+    """Triangles at the edge, shape (2, e), integers."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -114,13 +118,15 @@ def hull_of(points: bytes) -> Hull:
     one, other, opposite = one[bent], other[bent], opposite[bent]
     edges = np.array([[i for i in triangles[f] if i != left] for f, left in zip(one, opposite, strict=True)]).reshape(-1, 2)
     along = corners[edges[:, 1]] - corners[edges[:, 0]]
-    along /= np.linalg.norm(along, axis=1)[:, None]
-    outward = np.stack([np.cross(along, normals[one]), -np.cross(along, normals[other])], axis=1)
-    inwards = ((corners[opposite] - corners[edges[:, 0]]) * outward[:, 0]).sum(axis=1) > 0.0
-    outward[inwards] *= -1.0
-    for array in (corners, triangles, normals, edges, outward):
+    lengths = np.linalg.norm(along, axis=1)
+    along /= lengths[:, None]
+    outward = np.stack([np.cross(along, normals[one]), -np.cross(along, normals[other])])
+    inwards = ((corners[opposite] - corners[edges[:, 0]]) * outward[0]).sum(axis=1) > 0.0
+    outward[:, inwards] *= -1.0
+    hull = Hull(corners, triangles, normals, -whole.equations[:, 3], edges, along, lengths, outward, np.stack([one, other]))
+    for array in hull:
         array.setflags(write=False)
-    return Hull(corners, triangles, normals, read_only(-whole.equations[:, 3]), edges, outward, np.stack([one, other], axis=1))
+    return hull
 
 
 def read_triangles(name: str) -> tuple[FloatArray, Any]:

@@ -1,22 +1,18 @@
-"""Signed distances from convex polyhedra: nearest points by Coal, made exact on the face, edge or corner where they are."""
+"""Signed distances from convex polyhedra: in the Voronoi region of a face, an edge or a corner that holds the nearest point."""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any, NamedTuple
 
-import coal
 import numpy as np
-from scipy.optimize import nnls
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import cross
 from softrobots.environment.convex_mesh import Hull
-from softrobots.environment.single_bodies import ON_BORDER, Bends, Triple, inner
+from softrobots.environment.single_bodies import ON_BORDER, Bends, Triple
 
-_TOLERANCE = 1e-12  # of Coal; the nearest point is then within 1e-6 of the size
-_TOUCHING = 1e-7  # of the size: faces that hold the nearest point
 _ROUNDING = 1e-13  # of the size
-_NOWHERE = np.zeros(3)
 
 
 class Polyhedra:
@@ -26,10 +22,6 @@ class Polyhedra:
         """Take axes, shape (n, 3, 3), origins, shape (n, 3) [m], and the polyhedra in their own axes."""
         self.rotations, self.centres, self.hulls = rotations, centres, hulls
         self.radii = np.zeros(len(hulls))
-        self._shapes = [_convex(hull) for hull in hulls]
-        self._point, self._here = coal.Sphere(0.0), coal.Transform3s()
-        self._request, self._there, self._result = coal.DistanceRequest(), coal.Transform3s(), coal.DistanceResult()
-        self._request.gjk_tolerance = _TOLERANCE
 
     def at_least(self, points: FloatArray) -> FloatArray:
         """Largest distance from the planes of the faces: the distance inside and at faces, else a lower bound of it."""
@@ -41,112 +33,108 @@ class Polyhedra:
 
     def at(self, points: FloatArray, which: Any) -> tuple[FloatArray, FloatArray]:
         """Distance and normal."""
-        found = [self._nearest(point, body) for point, body in zip(points, which.tolist(), strict=True)]
-        return np.array([one.distance for one in found]), np.array([one.normal for one in found]).reshape(-1, 3)
+        return self._nearest(points, which)[:2]
 
     def bends(self, number: int, point: Triple, distance: float, normal: Triple) -> Bends:
         """Nothing at faces, across the edge at an edge, the same in both directions across the normal at a corner."""
-        near = self._nearest(np.array(point), number)
-        if near.rank < 2:
+        near = self._nearest(np.array([point]), np.array([number]))
+        n, along, bend = near.normals[0], near.along[0], float(near.bends[0])
+        if bend == 0.0:
             return []
-        across = cross(near.along, near.normal)
+        edge = bool(along.any())
+        across = cross(along if edge else np.eye(3)[int(np.abs(n).argmin())], n)
         across /= np.sqrt(across @ across)
-        both: Any = [across.tolist(), cross(near.normal, across).tolist()]
-        return [(direction, 1.0 / near.distance) for direction in both[: near.rank - 1]]
+        both: Any = [across.tolist(), cross(n, across).tolist()]
+        return [(direction, bend) for direction in both[: 1 if edge else 2]]
 
     def along(self, points: FloatArray, which: Any, directions: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
         """Distance and normal, and the second derivative."""
-        distances, normals = self.at(points, which)
-        given: Any = zip(
-            which.tolist(), points.tolist(), distances.tolist(), normals.tolist(), directions.tolist(), strict=True
-        )
-        bends = [sum(c * inner(a, way) ** 2 for a, c in self.bends(*one)) for *one, way in given]
-        return distances, normals, np.array(bends)
+        near = self._nearest(points, which)
+        straight = np.vecdot(near.normals, directions) ** 2 + np.vecdot(near.along, directions) ** 2
+        return near.distances, near.normals, near.bends * (np.vecdot(directions, directions) - straight)
 
     def single(self, number: int) -> None:
-        """None: Coal finds nearest points."""
+        """None: its features are many."""
 
     def borders(self, starts: FloatArray, spans: FloatArray, which: Any) -> FloatArray:
         """Where the nearest point passes from a face to an edge (two columns an edge), or from an edge to a corner (two)."""
-        found = [self._borders(*one) for one in zip(starts, spans, which.tolist(), strict=True)]
-        shares = np.full((len(found), max((len(one) for one in found), default=0)), np.inf)
-        for row, one in zip(shares, found, strict=True):
-            row[: len(one)] = one
+        shares = np.full((len(starts), 4 * max(len(hull.edges) for hull in self.hulls)), np.inf)
+        for body, rows, local in self._by_body(starts, which):
+            found = _crossings(self.hulls[body], local, spans[rows] @ self.rotations[body])
+            shares[rows, : found.shape[1]] = found
         return shares
 
-    def _nearest(self, point: FloatArray, body: int) -> _Nearest:
-        hull, rotation = self.hulls[body], self.rotations[body]
-        local = rotation.T @ (point - self.centres[body])
-        heights = hull.normals @ local - hull.offsets
-        highest, size = int(heights.argmax()), float(np.abs(hull.corners).max())
-        if heights[highest] <= _ROUNDING * size:  # inside
-            return _Nearest(float(heights[highest]), rotation @ hull.normals[highest], 1, _NOWHERE)
-        nearest = self._by_coal(local, body)
-        holding = hull.normals[hull.normals @ nearest - hull.offsets > -_TOUCHING * size]
-        parts = nnls(holding.T, local - nearest)[0]  # the way from the nearest point is a sum of normals of the faces there
-        held = parts > ON_BORDER * parts.max()
-        faces = holding[held]
-        away = faces.T @ np.linalg.lstsq(faces @ faces.T, faces @ (local - nearest), rcond=None)[0]
-        distance = float(np.sqrt(away @ away))
-        along, rank = _NOWHERE, len(faces)
-        if rank == 2:
-            along = cross(*faces)
-            along /= np.sqrt(along @ along)
-            beside = nearest + _TOUCHING * 100.0 * size * np.array([along, -along])
-            if (beside @ hull.normals.T - hull.offsets).max(axis=1).min() > 1e-3 * _TOUCHING * size:
-                rank = 3  # two faces that meet at a corner alone
-        if rank > 2:
-            along = np.eye(3)[int(np.abs(away).argmin())]
-        return _Nearest(distance, rotation @ (away / distance), min(rank, 3), rotation @ along)
+    def _nearest(self, points: FloatArray, which: Any) -> _Nearest:
+        found = _Nearest(np.zeros(len(points)), np.zeros_like(points), np.zeros(len(points)), np.zeros_like(points))
+        for body, rows, local in self._by_body(points, which):
+            distances, normals, bends, along = _beside(self.hulls[body], local)
+            found.distances[rows], found.normals[rows] = distances, normals @ self.rotations[body].T
+            found.bends[rows], found.along[rows] = bends, along @ self.rotations[body].T
+        return found
 
-    def _by_coal(self, local: FloatArray, body: int) -> FloatArray:
-        self._there.setTranslation(local)
-        self._result.clear()
-        coal.distance(self._shapes[body], self._here, self._point, self._there, self._request, self._result)
-        return np.asarray(self._result.getNearestPoint1())
-
-    def _borders(self, start: FloatArray, span: FloatArray, body: int) -> FloatArray:
-        hull, rotation = self.hulls[body], self.rotations[body]
-        local, way = rotation.T @ (start - self.centres[body]), rotation.T @ span
-        first, last = hull.corners[hull.edges[:, 0]], hull.corners[hull.edges[:, 1]]
-        along = last - first
-        with np.errstate(divide="ignore", invalid="ignore"):
-            leaving = ((first - local)[:, None] * hull.outward).sum(axis=2) / (hull.outward @ way)  # (e, 2): over the edge
-            ending = np.stack([((end - local) * along).sum(axis=1) / (along @ way) for end in (first, last)], axis=1)
-        shares = np.concatenate([leaving, ending], axis=1)
-        shares = np.where((shares > 0.0) & (shares < 1.0), shares, np.inf)
-        rows, columns = np.nonzero(np.isfinite(shares))
-        ways = local + shares[rows, columns, None] * way - first[rows]
-        over = (ways[:, None] * hull.outward[rows]).sum(axis=2)
-        lying = (ways * along[rows]).sum(axis=1)
-        above = (ways[:, None] * hull.normals[hull.sides[rows]]).sum(axis=2)
-        side = np.minimum(columns, 1)
-        size = float(np.abs(hull.corners).max())
-        on_edge = (lying >= 0.0) & (lying <= (along[rows] ** 2).sum(axis=1)) & (above[np.arange(len(rows)), side] >= 0.0)
-        at_end = (over >= -_ROUNDING * size).all(axis=1)
-        real = np.where(columns < 2, on_edge, at_end)
-        shares[rows[~real], columns[~real]] = np.inf
-        return shares.ravel()
+    def _by_body(self, points: FloatArray, which: Any) -> Iterator[tuple[int, Any, FloatArray]]:
+        """Each body of some points, their places, and the points in its axes."""
+        for body in set(which.tolist()):
+            rows = (which == body).nonzero()[0]
+            yield body, rows, (points[rows] - self.centres[body]) @ self.rotations[body]
 
 
 class _Nearest(NamedTuple):
-    """The point of a polyhedron that is nearest to a point."""
+    """The points of polyhedra that are nearest to some points."""
 
-    distance: float
-    """Signed distance [m]."""
-    normal: FloatArray
-    """Normal."""
-    rank: int
-    """1 on a face, or inside; 2 on an edge; 3 at a corner."""
+    distances: FloatArray
+    """Signed distances, shape (m,) [m]."""
+    normals: FloatArray
+    """Normals, shape (m, 3)."""
+    bends: FloatArray
+    """Curvatures of the distance: zero at faces and inside, one over the distance elsewhere, shape (m,) [1/m]."""
     along: FloatArray
-    """Along the edge; at a corner any direction that is not the normal's."""
+    """Directions of edges, zero at faces and corners, shape (m, 3)."""
 
 
-def _convex(hull: Hull) -> Any:
-    """The polyhedron as Coal takes it."""
-    points, triangles = coal.StdVec_Vec3s(), coal.StdVec_Triangle()
-    for corner in hull.corners:
-        points.append(corner)
-    for a, b, c in hull.triangles.tolist():
-        triangles.append(coal.Triangle(a, b, c))
-    return coal.Convex(points, triangles)
+def _beside(hull: Hull, points: FloatArray) -> _Nearest:
+    """The same of one polyhedron in its own axes.
+
+    A point is over an edge if it is between its ends, and out of both faces there; else over the face whose plane is farthest
+    below it, if the nearest point of that is of the body; else over a corner. Borders belong to faces, then to edges.
+    """
+    size, heights = float(np.abs(hull.corners).max()), points @ hull.normals.T - hull.offsets
+    distances, normals = heights.max(axis=1), hull.normals[heights.argmax(axis=1)]
+    none, allowed = _Nearest(distances, normals, np.zeros(len(points)), np.zeros_like(points)), _ROUNDING * size
+    border = ON_BORDER * distances + allowed
+    first = hull.corners[hull.edges[:, 0]]
+    places = points @ hull.along.T - np.vecdot(first, hull.along)
+    out = (points @ side.T - np.vecdot(first, side) for side in hull.outward)
+    inside = np.minimum.reduce([places, hull.lengths - places, *out])  # of the region of each edge
+    edge, over = inside.argmax(axis=1), inside.max(axis=1)
+    beyond = (heights - distances[:, None] * (normals @ hull.normals.T)).max(axis=1)  # of the nearest point of the plane
+    curved = ((distances > allowed) & ((over > border) | (beyond > border))).nonzero()[0]
+    if not len(curved):
+        return none
+    some, edge, on_edge = points[curved], edge[curved], over[curved] >= -border[curved]
+    apart = ((some[:, None] - hull.corners) ** 2).sum(axis=2)
+    lying = first[edge] + places[curved, edge, None] * hull.along[edge]
+    away = some - np.where(on_edge[:, None], lying, hull.corners[apart.argmin(axis=1)])
+    none.distances[curved] = length = np.sqrt(np.vecdot(away, away))
+    none.normals[curved], none.bends[curved] = away / length[:, None], 1.0 / length
+    none.along[curved] = np.where(on_edge[:, None], hull.along[edge], 0.0)
+    return none
+
+
+def _crossings(hull: Hull, starts: FloatArray, ways: FloatArray) -> FloatArray:
+    """Shares of ways at which they cross the borders of the edges of a polyhedron in its own axes, shape (m, 4 e)."""
+    first = hull.corners[hull.edges[:, 0]]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        leaving = [(np.vecdot(first, side) - starts @ side.T) / (ways @ side.T) for side in hull.outward]  # over the edge
+        begins, speeds = np.vecdot(first, hull.along) - starts @ hull.along.T, ways @ hull.along.T
+        shares = np.stack([*leaving, begins / speeds, (begins + hull.lengths) / speeds], axis=2)
+    rows, edges, columns = ((shares > 0.0) & (shares < 1.0)).nonzero()
+    points = starts[rows] + shares[rows, edges, columns, None] * ways[rows] - first[edges]
+    lying, size, side = np.vecdot(points, hull.along[edges]), float(np.abs(hull.corners).max()), np.minimum(columns, 1)
+    above = np.vecdot(points, hull.normals[hull.sides[side, edges]]) >= 0.0
+    on_edge = (lying >= 0.0) & (lying <= hull.lengths[edges]) & above
+    at_end = np.vecdot(points, hull.outward[:, edges]).min(axis=0) >= -_ROUNDING * size
+    real = np.where(columns < 2, on_edge, at_end)
+    found = np.full_like(shares, np.inf)
+    found[rows[real], edges[real], columns[real]] = shares[rows[real], edges[real], columns[real]]
+    return found.reshape(len(starts), -1)
