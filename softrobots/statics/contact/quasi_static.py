@@ -31,13 +31,13 @@ from softrobots.statics.equilibrium_result import Equilibrium
 FAR = 0.04
 """Change of the springs that is no small step [rad]; a loss of stability that is over within less is not seen."""
 
-_FAR_MOVING = 0.2  # the same in a step of overdamped motion
+_FAR_MOVING = 0.2  # the same in a step of overdamped motion, soft springs counted like stiff ones: these move most there
 
 _MOST_MOMENTS = 400  # steps of the overdamped motion
 _STRONGEST = 1e6  # brake that is given up at, over the stiffness of the springs
 _STANDS, _PUSH = 1e-8, 1e-3  # change of the springs that is none, and that of a push [rad]
 _OPENS = 1e-6  # of the normal force, by which it is drawn to begin with
-_NEARLY_AT_REST = 0.02  # change of the springs below which the motion may have arrived
+_NEARLY_AT_REST = 0.02  # change of the springs in a unit of time below which the motion may have arrived
 
 
 class Rest(NamedTuple):
@@ -148,12 +148,12 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
     Returns:
         The state, with the work against friction of the whole motion.
     """
-    model, (sliding, here), state = given.model, carried_over(given, last), last
-    brake, work = 1.0, 0.0
+    (sliding, here), state, brake, work = carried_over(given, last), last, 1.0, 0.0
     for _ in range(_MOST_MOMENTS):
         given = remembering_rest(given, state)
-        there = settle(given, sliding, here, brake) or settle(given, let_go(sliding), here, brake)
-        moved = np.inf if there is None else change(model, there.q_springs, here)
+        there = settle(given, sliding, here, brake, patient=False)
+        there = there or settle(given, let_go(sliding), here, brake, patient=False)
+        moved = math.inf if there is None else float(np.linalg.norm(there.q_springs - here))
         if there is None or moved > _FAR_MOVING or may_have_passed(there.robot, state):
             brake *= 4.0
             if brake > _STRONGEST:
@@ -162,8 +162,9 @@ def move_to_rest(given: Given, last: Rest) -> Rest | None:
         work += there.work
         sliding, here, state = there.sliding, there.q_springs, there
         if moved < _NEARLY_AT_REST:
-            rest = settle(remembering_rest(given, state), sliding, here)
-            if rest is not None and change(model, rest.q_springs, here) < _NEARLY_AT_REST:
+            slow = max(brake, 1.0) * moved < _NEARLY_AT_REST  # without the brake it would hardly move farther
+            rest = settle(remembering_rest(given, state), sliding, here) if slow else None
+            if rest is not None and float(np.linalg.norm(rest.q_springs - here)) < _NEARLY_AT_REST:
                 return rest._replace(work=work + rest.work)
             if moved < _STANDS:  # on an equilibrium that does not hold: a small push along its softest motion
                 here, brake = here + _PUSH * there.robot.softest(there.found)[1], 1.0
