@@ -26,7 +26,7 @@ def curve(chain: Any, capsules: Any, bodies: Any, frames: Any, feature: Any, pla
     slides, spring_of = chain[2], chain[4]
     carrier, n, body = capsules[0][feature[0]], len(tangent), bodies[feature[1]]
     found, ends, span = np.zeros(FOUND), np.zeros((2, 3)), np.zeros(3)
-    surface(body, place[:3], True, found)
+    surface(body, place[:3], 1.0, found)
     act(frames[carrier], capsules[1][feature[0]], ends[0])
     act(frames[carrier], capsules[2][feature[0]], ends[1])
     for i in range(3):

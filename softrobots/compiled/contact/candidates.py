@@ -25,7 +25,7 @@ def find_candidates(
         capsule, feature = ends[e, 0], ends[e, 1]
         act(frames[carrier[capsule]], stops[capsule] if feature else starts[capsule], x)
         for o in range(len(bodies)):
-            surface(bodies[o], x, False, found)
+            surface(bodies[o], x, 0.0, found)
             for i in range(4):
                 table[e, o, i] = found[i]
             table[e, o, 4], table[e, o, 5], table[e, o, 6] = x[0], x[1], x[2]

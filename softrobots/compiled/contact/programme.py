@@ -89,7 +89,10 @@ def add_row(factor: Any, row: Any, place: Any, chosen: Any, across: Any, pressed
 
 def programme(factor: Any, pull: Any, gaps: Any, rows: Any, sizes: Any, forces: Any, step: Any) -> Any:
     """Minimise over the gaps that stay open; whether it is done. `forces`, a guess of what presses, become multipliers."""
-    n, count, free, guessed, pressed = len(pull), len(gaps), -pull, True, 0
+    n, count, free, guessed = len(pull), len(gaps), np.zeros(len(pull)), True
+    pressed = 0 * n  # no constant, for which numba would compile all again
+    for i in range(n):
+        free[i] = -pull[i]
     forward(factor, n, free)
     chosen, across, gram, new = np.zeros(n, dtype=np.int64), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     for c in range(count):

@@ -34,7 +34,8 @@ def repair(world: Any, states: Any, table: Any, soft: Any, work: Any) -> Any:
     """Bring a start that is inside of obstacles out of them by the least bending; which state it is, -1 if there is no way."""
     at, places, counts, rows, numbers = states[0], states[3], states[4], states[6], states[9]
     matrix, scaled, widths, wanted, step = work
-    here, longest, deepest, promised, n = 0, LARGEST_STEP, -1.0, 0.0, len(soft)
+    longest, deepest, promised, n = LARGEST_STEP, -1.0, 0.0, len(soft)
+    here = 0 * n  # no constant, for which numba would compile all again
     for _ in range(MOST):
         if not look(world, states, here, FIRST_SEEN, table):
             return -1
@@ -49,12 +50,17 @@ def repair(world: Any, states: Any, table: Any, soft: Any, work: Any) -> Any:
             for j in range(i + 1):
                 matrix[i, j] = 1.0 if i == j else 0.0
         scale_rows(rows[here, :count], soft, scaled, widths)
-        wanted[:] = 0.0
+        for c in range(count):
+            wanted[c] = 0.0
         if not programme(matrix, np.zeros(n), places[here, :count, 3], scaled, widths, wanted, step):
             return -1
-        step *= soft
-        share = min(1.0, longest / max(np.abs(step).max(), 1e-300))
-        at[1 - here] = at[here] + share * step
+        largest = 1e-300
+        for i in range(n):
+            step[i] *= soft[i]
+            largest = max(largest, abs(step[i]))
+        share = min(1.0, longest / largest)
+        for i in range(n):
+            at[1 - here, i] = at[here, i] + share * step[i]
         promised = deep - deepest_after(places[here, :count, 3], rows[here], step, share)
         if promised < 1e-3 * deep:
             return -1
@@ -71,11 +77,12 @@ def settle(
     features, places, forces = np.zeros((2, CAPACITY, 3), dtype=np.int64), np.zeros((2, CAPACITY, 7)), np.zeros((2, CAPACITY))
     rows, load, tangent = np.zeros((2, CAPACITY, n)), np.zeros((2, n)), np.zeros((2, n, n))
     numbers, counts = np.zeros((2, NUMBERS)), np.zeros(2, dtype=np.int64)
-    matrix, soft, step = np.zeros((n, n)), 1.0 / np.sqrt(stiffness), np.zeros(n)
+    matrix, soft, step, pull = np.zeros((n, n)), np.zeros(n), np.zeros(n), np.zeros(n)
     scaled, widths, wanted = np.zeros((CAPACITY, n)), np.zeros(CAPACITY), np.zeros(CAPACITY)
     world = chain, capsules, bodies, motors, loads
     states = at, frames, features, places, counts, forces, rows, load, tangent, numbers
-    at[0] = springs
+    for i in range(n):
+        soft[i], at[0, i] = 1.0 / sqrt(stiffness[i]), springs[i]
     here, price, spent = repair(world, states, table, soft, (matrix, scaled, widths, wanted, step)), 0.0, 0
     if here < 0:
         return False
@@ -87,10 +94,14 @@ def settle(
             if shift > 1e6:
                 return False
         scale_rows(rows[here, :count], soft, scaled, widths)
-        wanted[:] = forces[here]
-        if not programme(matrix, soft * load[here], gaps, scaled, widths, wanted, step):
+        for c in range(count):
+            wanted[c] = forces[here, c]
+        for i in range(n):
+            pull[i] = soft[i] * load[here, i]
+        if not programme(matrix, pull, gaps, scaled, widths, wanted, step):
             return False
-        step *= soft
+        for i in range(n):
+            step[i] *= soft[i]
         length, pressing, bent = sqrt(dot(step, step)), 0.0, 0.0
         whole = min(1.0, LARGEST_STEP / max(length, 1e-300))
         for i in range(n):
@@ -109,7 +120,8 @@ def settle(
         seen = min(MOST_SEEN, max(LEAST_SEEN, 2.0 * whole * length * sqrt(float(n))))
         there = 1 - here
         while not found:
-            at[there] = at[here] + share * whole * step
+            for i in range(n):
+                at[there, i] = at[here, i] + share * whole * step[i]
             spent += 1
             if spent == MOST or share < SHORTEST or not look(world, states, there, seen, table):
                 return False
@@ -129,17 +141,19 @@ def settle(
     if not stiffened(tangent[here], soft, -2.0 * POSITIVE, matrix):
         return False
     act(frames[here, joints - 1], chain[6], tip)
-    springs[:] = at[here]
+    for i in range(n):
+        springs[i] = at[here, i]
     touching, out = 0, load[here]
     for c in range(counts[here]):
         force = forces[here, c]
         if force > 0.0 or places[here, c, 3] <= TOUCHING * reach:
             if touching == n:
                 return False
-            out -= force * rows[here, c]
+            for i in range(n):
+                out[i] -= force * rows[here, c, i]
+                scaled[touching, i] = rows[here, c, i]
             for i in range(3):
                 pushes[3 * features[here, c, 1] + i] += force * places[here, c, 4 + i]
-            scaled[touching] = rows[here, c]
             touching += 1
             for b in range(touching):
                 matrix[touching - 1, b] = dot(rows[here, c], scaled[b])

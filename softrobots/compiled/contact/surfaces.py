@@ -24,7 +24,7 @@ def to_body(body: Any, x: Any, local: Any) -> None:
 
 
 def surface(body: Any, x: Any, curved: Any, found: Any) -> None:
-    """Write the distance of a point, the normal, and, if `curved`, the Hessian row by row to the first 13 of `found`."""
+    """Write the distance of a point, the normal, and, if `curved` is not 0, the Hessian by rows to the first 13 of `found`."""
     found[LOCAL] = x[0] - body[CENTRE]
     found[LOCAL + 1] = x[1] - body[CENTRE + 1]
     found[LOCAL + 2] = x[2] - body[CENTRE + 2]
@@ -44,7 +44,7 @@ def surface(body: Any, x: Any, curved: Any, found: Any) -> None:
         beside_cylinder(body, local, normal, bend, found)
     for i in range(3):
         found[1 + i] = body[1 + 3 * i] * normal[0] + body[2 + 3 * i] * normal[1] + body[3 + 3 * i] * normal[2]
-    if not curved:
+    if curved == 0.0:
         return
     for i in range(3):
         for j in range(3):
@@ -181,7 +181,7 @@ def core_candidates(
         shares[place] = 2.0
         for i in range(3):
             x[i] = start[i] + best * span[i]
-        surface(body, x, False, found)
+        surface(body, x, 0.0, found)
         table[count, 0], table[count, 1] = best, found[0]
         table[count, 2] = found[1] * way[0] + found[2] * way[1] + found[3] * way[2]
         near = merged < best * length < length - merged and found[0] <= limit
@@ -207,7 +207,7 @@ def core_candidates(
     for _ in range(MAX_ITERATIONS):
         for i in range(3):
             x[i] = start[i] + share * span[i]
-        surface(body, x, True, found)
+        surface(body, x, 1.0, found)
         bend = bent_along(found, way)
         slope = found[1] * way[0] + found[2] * way[1] + found[3] * way[2]
         if fabs(slope) <= SLOPE:

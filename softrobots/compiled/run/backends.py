@@ -169,17 +169,22 @@ def _emitter() -> str:
     return hashlib.sha256("".join(texts).encode()).hexdigest()[:24]
 
 
-def jitted(constants: str, functions: str) -> ModuleType:
-    """Return functions of the package as numba compiles them, from the text of their constants and their own."""
-    return _module(f"{_NUMBA_HEAD}\nfrom math import copysign, cos, sin\n\n{constants}\n\n\n{_decorated(functions)}\n")
+def jitted(constants: str, functions: str, called: str) -> ModuleType:
+    """Return functions of the package as numba compiles them, from the text of their constants and their own.
+
+    Python can call the one that is named, the last: wrappers of all would take as long to compile as the functions.
+    """
+    inner, last = functions.split(f"def {called}(")
+    text = f"{_decorated(inner, ', no_cpython_wrapper=True')}{_decorated(f'def {called}({last}')}"
+    return _module(f"{_NUMBA_HEAD}\nfrom math import copysign, cos, sin\n\n{constants}\n\n\n{text}\n")
 
 
-def _decorated(functions: str) -> str:
+def _decorated(functions: str, more: str = "") -> str:
     """Return functions with numba's decorators."""
     from softrobots.compiled.translate.llvm_expressions import FASTMATH
 
     fastmath = ", ".join(map(repr, FASTMATH))
-    decorator = f"@njit(cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, fastmath={{{fastmath}}})\n"
+    decorator = f"@njit(cache=True, nogil=True, error_model='numpy', no_cfunc_wrapper=True, fastmath={{{fastmath}}}{more})\n"
     return re.sub(r"^def ", f"{decorator}def ", functions, flags=re.MULTILINE)
 
 

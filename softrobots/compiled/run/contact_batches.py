@@ -44,7 +44,7 @@ def _compiled() -> Any:
     constants = {name: value for module in modules for name, value in vars(module).items() if name.isupper()}
     functions = [function for module in modules for function in functions_of(module)]
     head = "\n".join(f"{name} = {value!r}" for name, value in constants.items())
-    return jitted(head, "\n\n\n".join(map(inspect.getsource, functions)))
+    return jitted(head, "\n\n\n".join(map(inspect.getsource, functions)), "settle_batch")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
