@@ -223,10 +223,8 @@ def _pieces(text: str) -> tuple[list[str], list[Any]]:
         codes = [compile(part.strip(), "<expression>", "eval") for part in parts[1::2]]
     except (SyntaxError, ValueError):
         codes = []
-    plain = not any("$" in part for part in parts[::2]) and not any(
-        name[:2] == "__" for code in codes for name in code.co_names
-    )
-    return parts[::2], codes if plain else []
+    left = "$" in "".join(parts[::2]) or any(name[:2] == "__" for code in codes for name in code.co_names)
+    return parts[::2], [] if left else codes
 
 
 @contextmanager
@@ -301,9 +299,8 @@ class _Element(minidom.Element):
         copy.ownerDocument, copy.texts = self.ownerDocument, dict(self.texts)
         last: Any = None
         for child in self.childNodes if deep else ():
-            new: Any = (
-                self.ownerDocument.createTextNode(child.data) if child.nodeType == self.TEXT_NODE else child.cloneNode(deep)
-            )
+            plain = child.nodeType == self.TEXT_NODE
+            new: Any = self.ownerDocument.createTextNode(child.data) if plain else child.cloneNode(deep)
             new.parentNode, new.previousSibling = copy, last
             if last is not None:
                 last.nextSibling = new
