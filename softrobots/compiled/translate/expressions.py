@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 
 from softrobots.compiled.translate.dialect import Dialect, Part, bare
-from softrobots.compiled.translate.kernel_language import INTRINSICS, Function, Module
+from softrobots.compiled.translate.kernel_language import INTRINSICS, Function, Module, walk
 
 _ARITHMETIC: dict[type[ast.operator], str] = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 _ON_KNOWN: dict[type[ast.operator], Callable[[int, int], int]] = {
@@ -137,7 +137,7 @@ class Scope:
             self.module.refuse(node, f"{name} takes {len(kinds)} argument{'' if len(kinds) == 1 else 's'}")
         shown = [self._argument(argument, kind, name) for argument, kind in zip(node.args, kinds, strict=True)]
         if function is None:
-            called = (getattr(one.func, "id", "") for one in ast.walk(node) if isinstance(one, ast.Call))
+            called = (getattr(one.func, "id", "") for one in walk(node) if isinstance(one, ast.Call))
             inside = [parameter for one in called if one in self.earlier for parameter in self.earlier[one].parameters]
             if any(parameter.written for parameter in inside):
                 self.module.refuse(node, f"a call that writes an array stands outside of {name}")

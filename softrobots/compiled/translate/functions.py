@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from softrobots.compiled.translate.dialect import Dialect, Part
 from softrobots.compiled.translate.expressions import Scope
-from softrobots.compiled.translate.kernel_language import WORDS, Function, Module, Parameter, is_over_stages, read_module
+from softrobots.compiled.translate.kernel_language import WORDS, Function, Module, Parameter, is_over_stages, read_module, walk
 from softrobots.compiled.translate.lines import INDENT, comment
 
 
@@ -69,7 +69,7 @@ class FunctionWriter:
     def _check_loops(self, parameters: Sequence[str]) -> None:
         """Refuse variables of `for` that are used outside of their loops, or assigned in them: C counts on after the last."""
         inside: Counter[str] = Counter()
-        loops = [node for statement in self.function.body for node in ast.walk(statement) if isinstance(node, ast.For)]
+        loops = [node for statement in self.function.body for node in walk(statement) if isinstance(node, ast.For)]
         for loop in loops:
             if isinstance(loop.target, ast.Name):
                 name = loop.target.id
@@ -195,11 +195,11 @@ class FunctionWriter:
             for value in node.values:
                 self._ordered(value)
             return
-        parts = list(ast.walk(node))
-        calls = [part for part in parts if any(one.written for one in self._parameters(part))]
+        parts = walk(node)
+        calls = [part for part in parts if isinstance(part, ast.Call) and any(one.written for one in self._parameters(part))]
         if not calls:
             return
-        inside = {id(part) for part in ast.walk(calls[0])}
+        inside = {id(part) for part in walk(calls[0])}
         for part in parts:
             reads = isinstance(part, ast.Subscript) and isinstance(part.ctx, ast.Load)
             reads = reads or any(one.kind == "array" for one in self._parameters(part))
@@ -226,7 +226,7 @@ def _ends(block: Sequence[ast.stmt]) -> bool:
 
 
 def _names(block: Sequence[ast.AST]) -> list[ast.Name]:
-    return [node for part in block for node in ast.walk(part) if isinstance(node, ast.Name)]
+    return [node for part in block for node in walk(part) if isinstance(node, ast.Name)]
 
 
 def _counts(block: Sequence[ast.AST]) -> Counter[str]:

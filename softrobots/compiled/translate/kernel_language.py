@@ -20,7 +20,7 @@ import ast
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import NoReturn, TypeAlias
+from typing import Any, NoReturn, TypeAlias
 
 from softrobots.core.errors import ParameterError
 
@@ -37,6 +37,7 @@ WORDS = (*INTRINSICS, "zeros", "range", "Array", "int", "float", "bool")
 """Names with a meaning of their own, that a module cannot give away."""
 LARGEST_INT = 2**31 - 1
 """Ints are 32 bits wide in C."""
+_WALKED = (ast.expr, ast.stmt)
 
 
 @dataclass(frozen=True)
@@ -181,10 +182,23 @@ def _kind(annotation: ast.expr | None, allowed: tuple[str, ...]) -> str | None:
     return shown.lower() if shown in allowed else None
 
 
+def walk(node: Any) -> list[Any]:
+    """Return a node and all below it, as `ast.walk`, without operators and contexts; found once and kept with the node."""
+    if not hasattr(node, "walked"):
+        node.walked = [node]
+        for one in node.walked:  # to which it adds
+            for name in one._fields:
+                value = getattr(one, name, None)
+                below = value if isinstance(value, list) else (value,)
+                node.walked += [part for part in below if isinstance(part, _WALKED)]
+    found: list[Any] = node.walked
+    return found
+
+
 def _written(node: ast.FunctionDef, earlier: Mapping[str, Function]) -> set[str]:
     """Names of arrays that a function writes: itself, or through a function that it calls."""
     found = set()
-    for inner in ast.walk(node):
+    for inner in (one for statement in node.body for one in walk(statement)):
         match inner:
             case ast.Subscript(value=ast.Name(id=name), ctx=ast.Store()):
                 found.add(name)

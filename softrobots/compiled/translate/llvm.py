@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from softrobots.compiled.translate.kernel_language import Function, is_over_stages, read_module
+from softrobots.compiled.translate.kernel_language import Function, is_over_stages, read_module, walk
 from softrobots.compiled.translate.llvm_expressions import NAMES, PAIRED, ExpressionWriter, Symbols, Value, literal
 
 
@@ -46,7 +46,7 @@ class _FunctionWriter(ExpressionWriter):
     """Writes a function; what comes behind a jump stands in a block that nothing reaches."""
 
     def __init__(self, symbols: Symbols, function: Function, *, paired: bool) -> None:
-        names = [node for one in function.body for node in ast.walk(one) if isinstance(node, ast.Name)]
+        names = [node for one in function.body for node in walk(one) if isinstance(node, ast.Name)]
         stored = Counter(node.id for node in names if isinstance(node.ctx, ast.Store))
         stored.update(parameter.name for parameter in function.parameters)
         super().__init__(symbols, stored)

@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 
 from llvmlite import ir
 
-from softrobots.compiled.translate.kernel_language import INTRINSICS, Function
+from softrobots.compiled.translate.kernel_language import INTRINSICS, Function, walk
 
 FASTMATH = ("contract", "arcp", "nsz")
 """What LLVM may do with floating-point operations: nothing that changes an answer by more than a rounding."""
@@ -187,7 +187,7 @@ class ExpressionWriter:
             place = self.new(f"getelementptr inbounds {shape}, {pointer} {symbol}, i64 0, {index}", kind)
             return f"{POINTERS[kind]} {place.text}", kind
         place = self.new(f"getelementptr inbounds double, {self.values[name]}, {index}", "array")
-        if self.in_pairs and any(isinstance(one, ast.Name) and one.id == "stage" for one in ast.walk(node.slice)):
+        if self.in_pairs and any(isinstance(one, ast.Name) and one.id == "stage" for one in walk(node.slice)):
             place = self.new(f"bitcast {place} to {POINTERS['pair']}", "array")
             return f"{POINTERS['pair']} {place.text}", "pair"
         return str(place), "float"
