@@ -196,7 +196,7 @@ def test_steps_are_those_of_the_general_solver(name: str) -> None:
     fast = compiled(robot)
     model = fast.model
     slow = alone = batch = None
-    for motors, push in ways(model, change, force, 6):
+    for motors, push in ways(model, change, force, 4):
         slow = sr.solve_equilibrium(model, motors, push, gravity=sr.EARTH_GRAVITY, previous=slow)
         alone = fast.equilibrium(motors, push, gravity=sr.EARTH_GRAVITY, previous=alone)
         batch = fast.equilibria(motors, push, gravity=sr.EARTH_GRAVITY, previous=batch)
@@ -381,7 +381,7 @@ def test_strong_friction_in_guides_settles() -> None:
     robot, rng = sr.TendonArm(kind="tension", guide_friction=1.0), np.random.default_rng(1)
     model, fast = sr.load_model(robot), compiled(robot)
     general = mine = None
-    for _ in range(3):
+    for _ in range(2):
         tensions = rng.uniform(0.0, 40.0, 9)
         general = sr.solve_equilibrium(model, tensions, previous=general)
         mine = fast.equilibrium(tensions, previous=mine)

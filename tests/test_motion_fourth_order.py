@@ -59,7 +59,7 @@ def test_a_double_pendulum_swings_as_dop853_says_to_fourth_order() -> None:
 @pytest.mark.parametrize("kind", ["arm", "two_hinges", "odd", "rod"])
 def test_compiled_steps_are_those_of_simulate(kind: str) -> None:
     """Single, in a batch and step by step: unrolled chains, and a looped rod of hinges and a slide at one point."""
-    rod = sr.PccArm(muscle_azimuths=(), chain="lumped", hinges=4)
+    rod = sr.PccArm(segment_lengths=(0.524,), muscle_azimuths=(), chain="lumped", hinges=5)  # the least that has loops
     model = sr.load_model(rod) if kind == "rod" else ROBOTS[kind]()
     motors, rng = model.relaxed_motors, np.random.default_rng(4)
     push = 0.2 * model.springs.stiffness.min() / model.reach * rng.standard_normal(3)
@@ -108,7 +108,7 @@ def test_a_slender_rod_swings_far_by_the_steps_of_simulate() -> None:
 @pytest.mark.system
 @pytest.mark.parametrize("kind", ["arm", "rod"])
 def test_numba_and_the_c_file_take_the_same_steps(kind: str, tmp_path: Path) -> None:
-    rod = sr.PccArm(muscle_azimuths=(), chain="lumped", hinges=4)
+    rod = sr.PccArm(segment_lengths=(0.524,), muscle_azimuths=(), chain="lumped", hinges=5)  # the least that has loops
     model = sr.load_model(rod) if kind == "rod" else ROBOTS[kind]()
     motors = model.relaxed_motors
     options: dict[str, Any] = {"gravity": GRAVITY, "time_step": 4e-3, "order": 4}

@@ -203,7 +203,7 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
 @pytest.mark.parametrize(
     "engine",
     [
-        pytest.param("general", marks=pytest.mark.shortened(3, 50)),
+        pytest.param("general", marks=pytest.mark.shortened(2, 50)),
         pytest.param("compiled", marks=pytest.mark.shortened(20, 1600)),
     ],
 )

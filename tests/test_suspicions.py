@@ -274,7 +274,7 @@ def test_reversed_actuators_that_other_parameters_hide_are_told() -> None:
 
 
 @pytest.mark.study
-@pytest.mark.shortened(3, 200)
+@pytest.mark.shortened(2, 200)
 def test_a_noisy_fit_is_not_called_mirrored(cases: int) -> None:
     """Noise of 10 to 30 % of the motion; every other arm has links of other lengths than those told."""
     tried = 0
