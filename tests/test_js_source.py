@@ -200,7 +200,7 @@ def test_answers_are_those_of_python(browser: Any, name: str) -> None:
     The first to 1e-9: both leave 1e-10 of the load out of balance at most; the second to the last bit. Moments and axial forces
     of inflated links differ by that times their stiffness, up to 100 N m/rad.
     """
-    cases, model, kernel = random_cases(name, 50), compiled(name).model, plain_kernel(name)
+    cases, model, kernel = random_cases(name, 20), compiled(name).model, plain_kernel(name)
     place = kernel["UNKNOWN"]
     joints, certified, slack = kernel["N_MOTORS"], 0, 0
     for case, found in zip(cases, in_browser(browser, name, SOLVE, cases), strict=True):
@@ -227,7 +227,7 @@ def test_answers_are_those_of_python(browser: Any, name: str) -> None:
                 [link[key] for link in found["links"]] for key in ("moment", "axialForce", "slackMargin", "wrinklingMargin")
             ]
             assert np.abs(np.array(shown) - carried).max(initial=0.0) < 1e-7
-    assert certified > 40
+    assert certified > 0.8 * len(cases)
     assert slack > 0 or name not in ("tendons", "PCC, elastic")
 
 
