@@ -185,8 +185,8 @@ def test_ten_seconds_of_free_vibration_are_half_a_millimetre_off(
 ) -> None:
     """30 pairs of hinges or flexures, undamped, released upright from a sideways force, with steps by default.
 
-    Periods that differ drift apart in proportion to time: two seconds have a fifth of the error of ten, four two fifths. The reference is
-    five times as good, by one with a polynomial and a fifth of the steps in 0.05 s less.
+    Periods that differ drift apart in proportion to time: two seconds have a fifth of the error of ten, four two fifths. The
+    reference is five times as good, by one with a polynomial and a fifth of the steps in 0.05 s less.
     """
     rows, allowed = round(20.0 * duration), 5e-4 * duration / 10.0
     fine = _path(dataclasses.replace(rod, bends=bends), force, duration, rows, steps)

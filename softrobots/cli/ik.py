@@ -110,13 +110,7 @@ def run(arguments: argparse.Namespace) -> None:
         return
     gain = _GAIN if arguments.gain is None else arguments.gain
     trajectory = follow_trajectory(
-        model,
-        path.targets,
-        **options,
-        times=path.times,
-        gain=gain,
-        allow_jumps=arguments.allow_jumps,
-        progress="waypoints",
+        model, path.targets, **options, times=path.times, gain=gain, allow_jumps=arguments.allow_jumps, progress="waypoints"
     )
     files = save(arguments, trajectory) + write_plot(arguments, lambda: trajectories.poses(trajectory))
     print_answer(arguments, trajectory_answer(trajectory), trajectory.summary(None), files)

@@ -8,14 +8,7 @@ from typing import Any
 
 from softrobots.cli.options.command_line import add_damping, add_numbers
 from softrobots.cli.options.load_argument import add_environment, add_loads, loads_of
-from softrobots.cli.options.output_files import (
-    add_output,
-    add_plot,
-    check_ending,
-    check_files,
-    save,
-    write_plot,
-)
+from softrobots.cli.options.output_files import add_output, add_plot, check_ending, check_files, save, write_plot
 from softrobots.cli.options.robot_argument import add_model, add_motors, motors_of, one_or_each, statics_model_of
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.core.checks import positive_integer
@@ -74,11 +67,7 @@ def run(arguments: argparse.Namespace) -> None:
     servos = one_or_each("--servo-stiffness", arguments.servo_stiffness, model.motor_joints[placed], units)
     equilibrium = solve_equilibrium(model, motors_of(model, arguments.motors), **loads_of(arguments, model))
     modes = vibration_modes(
-        model,
-        equilibrium,
-        damping_time=arguments.damping_time,
-        mass_damping=arguments.mass_damping,
-        servo_stiffness=servos,
+        model, equilibrium, damping_time=arguments.damping_time, mass_damping=arguments.mass_damping, servo_stiffness=servos
     )
     files = save(arguments, modes) + write_plot(arguments, lambda: mode_shapes(modes, shown=arguments.count))
     pages = pages[: len(modes.frequencies)]

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import glob
-import itertools
 import re
 import threading
 import xml.etree.ElementTree as ElementTree
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from typing import Any, NamedTuple
 from xml.dom import minidom
@@ -18,6 +17,7 @@ from softrobots.core.errors import DescriptionError
 from softrobots.core.xml_input import parse_xml, read_xml
 from softrobots.description.number_tape import Tape
 from softrobots.description.paths import xacro_folder
+from softrobots.description.xacro_elements import parsed, replace_node
 
 XACRO_NAMESPACE = "http://www.ros.org/wiki/xacro"
 """XML namespace of xacro itself."""
@@ -151,8 +151,8 @@ def _checked_files() -> Iterator[None]:
         file = Path(xacro.root_dir, filename or "")
         if content is not None or not file.exists():  # xacro reports missing files, which may be optional
             return own["parse"](content, filename)
-        document = minidom.Document()
-        for node in _parsed(read_xml(file), str(file)).childNodes:
+        document: Any = minidom.Document()
+        for node in parsed(read_xml(file), str(file)).childNodes:
             document.appendChild(node.cloneNode(deep=True))
         return document
 
@@ -182,9 +182,6 @@ def _checked_files() -> Iterator[None]:
                 raise xacro.XacroException(exc=error, suffix=f"\nwhen evaluating an expression of {text!r}") from error
         return found[1] if len(codes) == 1 and between == ["", ""] else "".join(map(str, found))
 
-    def is_name(text: Any) -> Any:
-        return _once(own["is_valid_name"], text)
-
     class Table(xacro.Table):  # type: ignore[misc]
         """Names without recursion, texts without exceptions."""
 
@@ -199,21 +196,12 @@ def _checked_files() -> Iterator[None]:
             return value if isinstance(value, str) and _WORD.match(value) else xacro_table._eval_literal(value)
 
     xacro_table: Any = own["Table"]
-    ours = {"parse": checked, "eval_all": evaluated, "resolve_macro": resolved, "replace_node": _replace_node}
-    vars(xacro).update(ours, eval_text=text_of, is_valid_name=is_name, Table=Table)
+    ours = {"parse": checked, "eval_all": evaluated, "resolve_macro": resolved, "replace_node": replace_node}
+    vars(xacro).update(ours, eval_text=text_of, is_valid_name=partial(_once, own["is_valid_name"]), Table=Table)
     try:
         yield
     finally:
         vars(xacro).update(own)
-
-
-@lru_cache(maxsize=64)
-def _parsed(text: str, file: str) -> minidom.Document:
-    parse_xml(text, file)
-    document = minidom.parseString(text)
-    for element in document.getElementsByTagName("*"):
-        element.__class__, element.texts = _Element, dict(element.attributes.items())
-    return document
 
 
 def _pieces(text: str) -> tuple[list[str], list[Any]]:
@@ -248,87 +236,3 @@ def _recorded(tape: Tape | None) -> Iterator[None]:
         yield
     finally:
         xacro._global_symbols, xacro.Table._eval_literal = own, staticmethod(literal)
-
-
-class _Attribute(NamedTuple):
-    value: str
-
-
-class _Attributes:
-    """What xacro asks of the attributes of an element."""
-
-    def __init__(self, texts: dict[str, str]) -> None:
-        self._texts = texts
-        self.keys = texts.keys
-
-    def items(self) -> list[tuple[str, str]]:
-        return list(self._texts.items())
-
-    def __getitem__(self, name: str) -> _Attribute:
-        return _Attribute(self._texts[name])
-
-
-class _Element(minidom.Element):
-    """Element whose attributes are texts; minidom makes two nodes of each, which takes half of the time of an expansion."""
-
-    texts: dict[str, str]
-    """Attributes by name."""
-
-    def _get_attributes(self) -> _Attributes:
-        return _Attributes(self.texts)
-
-    attributes = property(_get_attributes)
-
-    def getAttribute(self, attname: str) -> str:
-        return self.texts.get(attname, "")
-
-    def getAttributeNode(self, attrname: str) -> _Attribute | None:  # type: ignore[override]
-        return _Attribute(self.texts[attrname]) if attrname in self.texts else None
-
-    def hasAttribute(self, name: str) -> bool:
-        return name in self.texts
-
-    def setAttribute(self, attname: str, value: str) -> None:
-        self.texts[attname] = value
-
-    def removeAttribute(self, name: str) -> None:
-        self.texts.pop(name, None)
-
-    def cloneNode(self, deep: bool) -> _Element:
-        copy = _Element(self.tagName)
-        copy.ownerDocument, copy.texts = self.ownerDocument, dict(self.texts)
-        last: Any = None
-        for child in self.childNodes if deep else ():
-            plain = child.nodeType == self.TEXT_NODE
-            new: Any = self.ownerDocument.createTextNode(child.data) if plain else child.cloneNode(deep)
-            new.parentNode, new.previousSibling = copy, last
-            if last is not None:
-                last.nextSibling = new
-            copy.childNodes.append(new)
-            last = new
-        return copy
-
-
-def _replace_node(node: Any, by: Any, content_only: bool = False) -> None:
-    """Replace a node by others, or by what they contain; xacro's own function searches the siblings for every one of them."""
-    nodes = []
-    for source in by if isinstance(by, list) else [by] if by is not None else []:
-        if content_only:
-            nodes += source.childNodes
-            del source.childNodes[:]
-        else:
-            if source.parentNode is not None:
-                source.parentNode.removeChild(source)
-            nodes.append(source)
-    siblings = node.parentNode.childNodes
-    place = siblings.index(node)
-    row = [node.previousSibling, *nodes, node.nextSibling]
-    for left, right in itertools.pairwise(row):
-        if left is not None:
-            left.nextSibling = right
-        if right is not None:
-            right.previousSibling = left
-    for new in nodes:
-        new.parentNode = node.parentNode
-    siblings[place : place + 1] = nodes
-    node.parentNode = node.previousSibling = node.nextSibling = None

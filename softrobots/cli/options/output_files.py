@@ -28,9 +28,7 @@ ROS_FORMS = (
 
 
 def add_output(
-    parser: argparse.ArgumentParser,
-    what: str,
-    forms: str = "as .npz or .json, for softrobots.load_result, or as a .csv table",
+    parser: argparse.ArgumentParser, what: str, forms: str = "as .npz or .json, for softrobots.load_result, or as a .csv table"
 ) -> None:
     """Add `-o`, which saves `what` in some forms, `RESULT_FILES` by default; `--overwrite` comes with `add_plot`."""
     parser.add_argument("-o", "--output", type=Path, metavar="FILE", help=f"save {what} {forms} (not saved)")

@@ -110,11 +110,7 @@ class PlacedLinks:
 
 
 def compare_kinematics(
-    source: Robot | Path | str,
-    load: Callable[[Path], LoadedRobot] = in_yourdfpy,
-    *,
-    count: int = COUNT,
-    seed: int = 20210312,
+    source: Robot | Path | str, load: Callable[[Path], LoadedRobot] = in_yourdfpy, *, count: int = COUNT, seed: int = 20210312
 ) -> PlacedLinks:
     """Compare where a tool places the links of a URDF with where Pinocchio places them.
 

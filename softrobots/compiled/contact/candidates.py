@@ -53,19 +53,8 @@ def find_candidates(
             for i in range(3):
                 begin[i] = table[first, o, 4 + i]
                 span[i] = table[last, o, 4 + i] - begin[i]
-            new = core_candidates(
-                bodies[o],
-                begin,
-                span,
-                lengths[capsule],
-                table[first, o],
-                table[last, o],
-                limit,
-                MERGED * reach,
-                hits,
-                found,
-                work,
-            )
+            length, at_first, at_last = lengths[capsule], table[first, o], table[last, o]
+            new = core_candidates(bodies[o], begin, span, length, at_first, at_last, limit, MERGED * reach, hits, found, work)
             for row in range(new):
                 if hits[row, 0] < 0.0:
                     continue

@@ -147,18 +147,9 @@ def borders_of(body: Any, start: Any, span: Any, shares: Any, work: Any) -> None
 
 
 def core_candidates(
-    body: Any,
-    start: Any,
-    span: Any,
-    length: Any,
-    first: Any,
-    last: Any,
-    limit: Any,
-    merged: Any,
-    hits: Any,
-    found: Any,
+    body: Any, start: Any, span: Any, length: Any, first: Any, last: Any, limit: Any, merged: Any, hits: Any, found: Any,
     work: Any,
-) -> Any:
+) -> Any:  # fmt: skip
     """Find the minimum inside of a core and crossed borders; `softrobots.environment.nearest_points.core_points`.
 
     Writes feature, point, distance and normal of each to a row of `hits`; `first` and `last` are distance and normal at the

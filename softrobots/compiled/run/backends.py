@@ -35,10 +35,7 @@ RESPONSES = tuple(f"{way}_{kind}_batch" for way in ("pull", "push") for kind in 
 BACKENDS = ("numba", "python")
 """Names of the back ends, the preferred one first."""
 
-_SINGLE = (
-    *("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip"),
-    *("motion_step", "motion_run", "place_at"),
-)
+_SINGLE = (*("settle", "settle_from", "estimate", "reach", "follow", "look_at_tip"), *("motion_step", "motion_run", "place_at"))
 _BATCHES = ("settle_batch", "estimate_batch", "reach_batch", "motion_batch", "respond_batch", *RESPONSES)
 
 _NUMBA_HEAD = """from __future__ import annotations

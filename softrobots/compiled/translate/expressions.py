@@ -83,8 +83,7 @@ class Scope:
                 sign = "&&" if isinstance(operation, ast.And) else "||"
                 return Part(f" {sign} ".join(self.condition(value).operand() for value in values), "bool", sign)
         self.module.refuse(
-            node,
-            "numbers, names, array[index], calls by position, + - * / on numbers, one comparison at a time, and, or, not",
+            node, "numbers, names, array[index], calls by position, + - * / on numbers, one comparison at a time, and, or, not"
         )
 
     def condition(self, node: ast.expr) -> Part:

@@ -9,13 +9,7 @@ import numpy as np
 from softrobots.core.checks import instance_of, positive_integer
 from softrobots.statics.kinematics import backbone
 from softrobots.statics.trajectory import Trajectory
-from softrobots.view.figures.canvas import (
-    COLOURS,
-    WIDTH,
-    equal_box,
-    force_arrow,
-    new_space,
-)
+from softrobots.view.figures.canvas import COLOURS, WIDTH, equal_box, force_arrow, new_space
 
 
 def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
