@@ -142,11 +142,7 @@ ROBOTS: dict[str, tuple[Any, float, float]] = {
         0.05,
     ),
     "guides_of_bent": (sr.TendonArm(rest_bend_x=0.7, rest_twist=0.4, guide_friction=0.2, elastic_sections=2), 2e-3, 0.05),
-    "guides_mixed": (
-        sr.TendonArm(kind=("elastic", "tension", "elastic"), guide_friction=0.1, elastic_sections=2),
-        1e-3,
-        0.05,
-    ),
+    "guides_mixed": (sr.TendonArm(kind=("elastic", "tension", "elastic"), guide_friction=0.1, elastic_sections=2), 1e-3, 0.05),
     "tensions": (sr.TendonArm(kind="tension", bending_friction=1e-3, elastic_sections=2), 0.8, 0.05),
     "from_base": (sr.PccArm(bending_friction=0.3, routing="base"), 5e-3, 1.0),
     "hinges": (sr.PccArm(bending_friction=0.3, chain="lumped", elastic_sections=2), 0.02, 1.0),

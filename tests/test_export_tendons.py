@@ -169,10 +169,7 @@ def test_tendons_change_their_lengths_as_straight_actuators_do(tool: Tool) -> No
             assert abs(second[number] - stiffening) < 3e-6
 
 
-PIECES = (
-    (1, (0.0, 0.1, 0.3), (0.04, 0.03, 0.03), (0.2, 1.0, 2.5)),
-    (1, (0.07, 0.23), (0.03, 0.03), (1.0, 1.0)),
-)
+PIECES = ((1, (0.0, 0.1, 0.3), (0.04, 0.03, 0.03), (0.2, 1.0, 2.5)), (1, (0.07, 0.23), (0.03, 0.03), (1.0, 1.0)))
 """A winding table and a straight piece, that end within sections."""
 
 

@@ -134,10 +134,7 @@ def long_chain(movable: int, fixed: int) -> str:
     return chain(*("\n" + joint(f"j{i}", links[i], links[i + 1], axes[i % 2], k, "0.1 0 0") for i, k in enumerate(kinds)))
 
 
-@pytest.mark.parametrize(
-    ("movable", "fixed", "agrees"),
-    [(122, 5, True), (123, 0, False), (100, 27, True), (100, 28, False)],
-)
+@pytest.mark.parametrize(("movable", "fixed", "agrees"), [(122, 5, True), (123, 0, False), (100, 27, True), (100, 28, False)])
 def test_how_many_joints_pybullet_takes(movable: int, fixed: int, agrees: bool) -> None:
     """It loads 123, but the last one stays at zero without a word."""
     (row,) = compare_tools(long_chain(movable, fixed), [needed("PyBullet")], count=2)
