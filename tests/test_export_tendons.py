@@ -116,7 +116,7 @@ def test_the_arm_stands_in_mujoco_where_it_stands_here(tool: Tool, name: str) ->
 
 
 @pytest.mark.study
-@pytest.mark.parametrize("name", ["helical", "length", "loaded"])
+@pytest.mark.parametrize("name", ["helical", "elastic", "length", "loaded", "mckibben"])
 def test_thirty_hinges_a_segment_are_within_a_ten_thousandth_of_the_length(tool: Tool, name: str) -> None:
     """From 8 to 30 hinges an error of second order becomes 14 times smaller."""
     coarse, fine = misses(tool("mujoco"), name, (8, 30))
