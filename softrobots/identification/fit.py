@@ -8,7 +8,7 @@ and those that noise hides, where a search runs off along them without a gain th
 from __future__ import annotations
 
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -26,6 +26,7 @@ _FARTHEST = 100.0  # factor by which a search changes a positive parameter at mo
 _RUN_OFF = np.log(10.0)  # change along a combination with a standard deviation above 100 % beyond which a search runs off
 _GAIN = 2.0  # of the cost, in variances, that makes up for that: two standard deviations
 _NEAR = 0.01  # change of the parameters, relative, up to which those derivatives are good enough on the way
+_ROUGH = 1e-3  # share of the cost that a further step may gain where a first search ends
 _SAME = 1e-8  # share of the cost that a further step may gain at the end: 0.005 standard errors with 1000 rows
 _SAME_RUBBING = 1e-5  # the same of a robot with dry friction: where rows begin to slip, the cost has kinks
 _ROUNDING = 1e-22  # share of the first cost that is rounding
@@ -36,13 +37,19 @@ _PATIENCE = 10  # steps of a search before full steps are tried
 _LEAPS = 6  # full steps in a row
 _MOST_LOST = 0.9  # share of a positive parameter, or of its inverse, that such a step takes
 
+Stage = Literal["first", "last", "whole"]
+"""Of a search: the first, of few rows, which ends early; the last, which begins near, with full steps; or the only one."""
+
 
 class Fit:
     """A search from one start; `message`, `course` and `values` tell how it ended."""
 
-    def __init__(self, predictor: Predictor, weights: Weights, prior: Prior, loss: str, steps: Iterator[Any]) -> None:
-        """Take predictions, weights, prior, loss, and an iterator that is advanced at every step."""
+    def __init__(
+        self, predictor: Predictor, weights: Weights, prior: Prior, loss: str, steps: Iterator[Any], stage: Stage = "whole"
+    ) -> None:
+        """Take predictions, weights, prior, loss, an iterator that is advanced at every step, and the stage of the search."""
         self.predictor, self.weights, self.prior, self.loss, self._steps = predictor, weights, prior, loss, steps
+        self._stage = stage
         self._logarithmic = predictor.parameters.logarithmic
         self._same = _SAME if predictor.parameters.present.structure.friction is None else _SAME_RUBBING
         self._held = self._weak = np.zeros((0, len(self._logarithmic)))
@@ -96,21 +103,28 @@ class Fit:
         with np.errstate(divide="ignore"):
             bounds = [self._coordinates(np.maximum(ends, np.where(self._logarithmic, 0.0, -np.inf)))
                       for ends in (limits.lower, limits.upper)]  # fmt: skip
-        x, rounds, spent = np.clip(x, *bounds), 0, 0
+        x, rounds, spent, settled = np.clip(x, *bounds), 0, 0, False
+        leaps = self._stage == "last"
         while rounds < _ROUNDS and spent < most:
             left, self._middle = min(most - spent, _PATIENCE), x
-            found = least_squares(
-                self._rows, x, self._jacobian, bounds, x_scale="jac", loss=self._loss, ftol=self._same, xtol=1e-9,
-                gtol=1e-12, max_nfev=left,
-            )  # fmt: skip
-            x, spent, rounds = found.x, spent + found.nfev, rounds + (found.status > 0)
+            if leaps:
+                self._record(x)
+            else:
+                found = least_squares(
+                    self._rows, x, self._jacobian, bounds, x_scale="jac", loss=self._loss, xtol=1e-9, gtol=1e-12, max_nfev=left,
+                    ftol=_ROUGH if self._stage == "first" else self._same,
+                )  # fmt: skip
+                x, spent, settled = found.x, spent + found.nfev, found.status > 0
+            if settled and self._stage == "first":
+                break
+            rounds, leaps = rounds + (settled or leaps), False
             if self._exact_at is not x:
                 self._refresh(x)
             lowest = self._is_lowest(x, *bounds)
             if not lowest or self._cost(x) <= _WITHOUT_NOISE * self.course[0][0]:
                 x = self._leap(x, *bounds)
                 lowest = self._is_lowest(x, *bounds)
-            self.message = "converged" if found.status > 0 or lowest else f"not converged in {most} steps"
+            self.message = "converged" if settled or lowest else f"not converged in {most} steps"
             held = self._null(x)
             if (lowest and len(held) == len(self._held)) or (not len(self._weak) and len(self._run_off(x))):
                 break
@@ -124,7 +138,7 @@ class Fit:
         each gains are short. Without noise they also find all digits that rounding leaves.
         """
         best, costs = x, [self._cost(x)]
-        while len(costs) <= _LEAPS and (len(costs) < 3 or costs[-1] < costs[-2]):
+        while len(costs) <= _LEAPS and (len(costs) < 3 or costs[-1] < costs[-2] * (1.0 - self._same)):
             tried = list[tuple[float, FloatArray]]()
             for end in self._full_steps(x, lower, upper):
                 tried.append((self._cost(end), end))

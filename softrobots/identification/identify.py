@@ -22,7 +22,7 @@ from softrobots.core.blas_threads import one_blas_thread
 from softrobots.core.checks import FloatArray, choice, finite_array, instance_of, positive_array, positive_integer
 from softrobots.core.errors import NameNotFound, ParameterError, SoftRobotsError
 from softrobots.core.progress import with_progress
-from softrobots.identification.fit import INTERRUPTED, Fit
+from softrobots.identification.fit import INTERRUPTED, Fit, Stage
 from softrobots.identification.identification import Identification, identification_of
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
@@ -115,16 +115,16 @@ def identify(
         weights = Weights.of(rows.std, predictor.at(values[0]).differences(), counted)
         if not len(weights.rows()):
             raise ParameterError("measurements", measurements, "with at least one number in a row that counts")
-        robust = loss if weights.known else "linear"
+        robust, stage = loss if weights.known else "linear", "whole"
         if every > 1:
             few = Predictor(chosen, rows[::every])
-            quick = _best(few, weights.every(every), prior, robust, steps, values, most)
-            values, message = [quick.values], quick.message
-        best = _best(predictor, weights, prior, robust, steps, values, 0 if message == INTERRUPTED else most)
+            quick = _best(few, weights.every(every), prior, robust, steps, values, most, "first")
+            values, message, stage = [quick.values], quick.message, "last"
+        best = _best(predictor, weights, prior, robust, steps, values, 0 if message == INTERRUPTED else most, stage)
         again = not weights.known and (loss != "linear" or len(weights.std) > 1)
         if again and INTERRUPTED not in (message, best.message) and best.cost > _PERFECT * len(weights.rows()):
             weights = weights.estimated(best.at_end()[0].differences())
-            best = _best(predictor, weights, prior, loss, steps, [best.values], most)
+            best = _best(predictor, weights, prior, loss, steps, [best.values], most, "last")
         best.message = message if message == INTERRUPTED else best.message
         return identification_of(best, others)
 
@@ -137,11 +137,12 @@ def _best(
     steps: Iterator[Any],
     starts: Sequence[FloatArray],
     most: int,
+    stage: Stage = "whole",
 ) -> Fit:
     """The best fit of several starts; those without equilibria but the first are passed over."""
     best: Fit | None = None
     for start in starts:
-        fit = Fit(predictor, weights, prior, loss, steps)
+        fit = Fit(predictor, weights, prior, loss, steps, stage)
         try:
             fit.run(start, most)
         except SoftRobotsError:
