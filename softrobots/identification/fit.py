@@ -25,7 +25,7 @@ _ROUNDS = 6  # most searches, each with derivatives of the model's numbers of wh
 _FARTHEST = 100.0  # factor by which a search changes a positive parameter at most; the next one goes on
 _RUN_OFF = np.log(10.0)  # change along a combination with a standard deviation above 100 % beyond which a search runs off
 _GAIN = 2.0  # of the cost, in variances, that makes up for that: two standard deviations
-_NEAR = 0.01  # change of the parameters, relative, up to which those derivatives are good enough on the way
+_NEAR, _NEARLY = 0.01, 0.1  # change of the parameters, relative, up to which those are good enough on the way, and at first
 _ROUGH = 1e-3  # share of the cost that a further step may gain where a first search ends
 _SAME = 1e-8  # share of the cost that a further step may gain at the end: 0.005 standard errors with 1000 rows
 _SAME_RUBBING = 1e-5  # the same of a robot with dry friction: where rows begin to slip, the cost has kinks
@@ -241,7 +241,7 @@ class Fit:
         return np.concatenate([data, known, self._held @ (x - self._anchor), self._weak @ (x - self._weak_anchor)])
 
     def _jacobian(self, x: FloatArray) -> FloatArray:
-        if self._moved(x) > _NEAR:
+        if self._moved(x) > (_NEARLY if self._stage == "first" else _NEAR):
             self._refresh(x)
         self._record(x)
         next(self._steps)
