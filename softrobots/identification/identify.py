@@ -119,7 +119,7 @@ def identify(
         if every > 1:
             few = Predictor(chosen, rows[::every])
             quick = _best(few, weights.every(every), prior, robust, steps, values, most, "first")
-            values, message, stage = [quick.values], quick.message, "last"
+            values, message, stage = [quick.values], quick.message, "whole" if in_order else "last"
         best = _best(predictor, weights, prior, robust, steps, values, 0 if message == INTERRUPTED else most, stage)
         again = not weights.known and (loss != "linear" or len(weights.std) > 1)
         if again and INTERRUPTED not in (message, best.message) and best.cost > _PERFECT * len(weights.rows()):
