@@ -110,16 +110,18 @@ def identify(
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
     with one_blas_thread(1000):
-        predictor = Predictor(chosen, rows)
-        values[0] = _mounted(predictor, values[0], counted)
-        weights = Weights.of(rows.std, predictor.at(values[0]).differences(), counted)
+        predictor, stage = Predictor(chosen, rows), "whole"
+        few = Predictor(chosen, rows[::every]) if every > 1 and _sees_all(rows, counted, every) else predictor
+        told = counted if few is predictor else counted[::every]
+        values[0] = _mounted(few, values[0], told)
+        weights = Weights.of(few.measurements.std, few.at(values[0]).differences(), told)
         if not len(weights.rows()):
             raise ParameterError("measurements", measurements, "with at least one number in a row that counts")
-        robust, stage = loss if weights.known else "linear", "whole"
-        if every > 1:
-            few = Predictor(chosen, rows[::every])
-            quick = _best(few, weights.every(every), prior, robust, steps, values, most, "first")
+        robust = loss if weights.known else "linear"
+        if few is not predictor:
+            quick = _best(few, weights, prior, robust, steps, values, most, "first")
             values, message, stage = [quick.values], quick.message, "whole" if in_order else "last"
+            weights = weights.of_more(rows.std, predictor.at(quick.values).differences(), counted)
         best = _best(predictor, weights, prior, robust, steps, values, 0 if message == INTERRUPTED else most, stage)
         again = not weights.known and (loss != "linear" or len(weights.std) > 1)
         if again and INTERRUPTED not in (message, best.message) and best.cost > _PERFECT * len(weights.rows()):
@@ -127,6 +129,12 @@ def identify(
             best = _best(predictor, weights, prior, loss, steps, [best.values], most, "last")
         best.message = message if message == INTERRUPTED else best.message
         return identification_of(best, others)
+
+
+def _sees_all(rows: Measurements, counted: Any, every: int) -> bool:
+    """Whether some rows have numbers of all that was measured."""
+    measured = [np.isfinite(one.reshape(len(one), -1)).any(axis=1) & counted for one in rows.measured.values()]
+    return all(one[::every].any() for one in measured)
 
 
 def _best(

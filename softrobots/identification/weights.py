@@ -40,10 +40,10 @@ class Weights:
         )
         return start._rescaled(differences, lambda numbers: max(float(np.sqrt(np.mean(numbers**2))), _ROUNDING))
 
-    def every(self, step: int) -> Weights:
-        """Return those of every row whose number is a multiple of a step."""
-        std, counted = ({key: one[::step] for key, one in part.items()} for part in (self.std, self.counted))
-        return Weights(std, counted, self.given)
+    def of_more(self, given: Mapping[str, FloatArray], differences: Mapping[str, FloatArray], rows: Any) -> Weights:
+        """Return those of more rows, with arguments as of `of`; standard deviations that are not known stay as they are."""
+        std = {key: np.broadcast_to(self.std[key][0], values.shape) for key, values in differences.items()}
+        return Weights(std | dict(given), {key: np.isfinite(one) & rows[:, None] for key, one in differences.items()}, self.given)
 
     def estimated(self, differences: Mapping[str, FloatArray]) -> Weights:
         """Return weights in which the robust spread of residuals is the standard deviation that is not known."""
