@@ -109,8 +109,9 @@ def identify(
 
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
+    last: Stage = "whole" if in_order else "last"  # few rows of friction come by another way
     with one_blas_thread(1000):
-        predictor, stage = Predictor(chosen, rows), "whole"
+        predictor = Predictor(chosen, rows)
         few = Predictor(chosen, rows[::every]) if every > 1 and _sees_all(rows, counted, every) else predictor
         told = counted if few is predictor else counted[::every]
         values[0] = _mounted(few, values[0], told)
@@ -120,13 +121,14 @@ def identify(
         robust = loss if weights.known else "linear"
         if few is not predictor:
             quick = _best(few, weights, prior, robust, steps, values, most, "first")
-            values, message, stage = [quick.values], quick.message, "whole" if in_order else "last"
+            values, message = [quick.values], quick.message
             weights = weights.of_more(rows.std, predictor.at(quick.values).differences(), counted)
-        best = _best(predictor, weights, prior, robust, steps, values, 0 if message == INTERRUPTED else most, stage)
+        most_left, stage = 0 if message == INTERRUPTED else most, "whole" if few is predictor else last
+        best = _best(predictor, weights, prior, robust, steps, values, most_left, stage)
         again = not weights.known and (loss != "linear" or len(weights.std) > 1)
         if again and INTERRUPTED not in (message, best.message) and best.cost > _PERFECT * len(weights.rows()):
             weights = weights.estimated(best.at_end()[0].differences())
-            best = _best(predictor, weights, prior, loss, steps, [best.values], most, "last")
+            best = _best(predictor, weights, prior, loss, steps, [best.values], most, last)
         best.message = message if message == INTERRUPTED else best.message
         return identification_of(best, others)
 

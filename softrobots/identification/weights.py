@@ -43,7 +43,8 @@ class Weights:
     def of_more(self, given: Mapping[str, FloatArray], differences: Mapping[str, FloatArray], rows: Any) -> Weights:
         """Return those of more rows, with arguments as of `of`; standard deviations that are not known stay as they are."""
         std = {key: np.broadcast_to(self.std[key][0], values.shape) for key, values in differences.items()}
-        return Weights(std | dict(given), {key: np.isfinite(one) & rows[:, None] for key, one in differences.items()}, self.given)
+        counted = {key: np.isfinite(values) & rows[:, None] for key, values in differences.items()}
+        return Weights(std | dict(given), counted, self.given)
 
     def estimated(self, differences: Mapping[str, FloatArray]) -> Weights:
         """Return weights in which the robust spread of residuals is the standard deviation that is not known."""
