@@ -16,6 +16,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 import softrobots as sr
+from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.suspicions import doubtful_sizes, hints, suspicions
 from softrobots.statics.kinematics import frame_placement
 from tests.conftest import CHECKOUT
@@ -271,6 +272,20 @@ def test_reversed_actuators_that_other_parameters_hide_are_told() -> None:
         told = [text for text in hints(fit) if "taking the actuators as" in text]
         assert len(told) == (min(signs) < 0), hints(fit)
         assert all("as 1, 2, -3, 4, 5, 6 leaves" in text for text in told)
+
+
+@pytest.mark.study
+def test_a_reversed_tendon_of_nine_is_told_that_offsets_and_stiffness_hide() -> None:
+    """Without a base to fit; the search ends among slack tendons, where steps gain nothing, before its hundred steps."""
+    robot, random = sr.TendonArm(elastic_sections=1), np.random.default_rng(3)
+    names = ("tendon_stiffness", "axial_stiffness", "motor[*].offset")
+    chosen, pulls = ParameterSet.of(robot, names), random.uniform(-3e-3, 3e-3, (50, 9))
+    model = chosen.model([8e3, 5e3, *3e-4 * random.standard_normal(9)])
+    tips = np.array([sr.solve_equilibrium(model, model.relaxed_motors - pull).tip_position for pull in pulls])
+    rows = sr.Measurements(pulls * np.where(np.arange(9) == 4, -1.0, 1.0), relative=True, tip_position=tips)
+    fit = sr.identify(robot, rows, names)
+    assert len(fit.history.cost) < 100
+    assert any("taking the actuators as 1, 2, 3, 4, -5, 6, 7, 8, 9 leaves" in text for text in hints(fit))
 
 
 @pytest.mark.study

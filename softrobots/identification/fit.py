@@ -34,6 +34,8 @@ _WITHOUT_NOISE = 1e-12  # share of the first cost below which the rows have no n
 _KEPT = 1e-6  # change along a combination, of logarithms or in units, that is none
 _AT_BOUND = 1e-9  # distance from a bound that is none
 _PATIENCE = 10  # steps of a search before full steps are tried
+_GAINED = 1e-4  # share of the cost that such a round of steps gains, or is idle
+_IDLE = 2  # idle rounds in a row after which a search ends
 _LEAPS = 6  # full steps in a row
 _MOST_LOST = 0.9  # share of a positive parameter, or of its inverse, that such a step takes
 
@@ -49,9 +51,9 @@ class Fit:
     ) -> None:
         """Take predictions, weights, prior, loss, an iterator that is advanced at every step, and the stage of the search."""
         self.predictor, self.weights, self.prior, self.loss, self._steps = predictor, weights, prior, loss, steps
-        self._stage = stage
-        self._logarithmic = predictor.parameters.logarithmic
-        self._same = _SAME if predictor.parameters.present.structure.friction is None else _SAME_RUBBING
+        self._stage, chosen = stage, predictor.parameters
+        self._logarithmic, self._coordinates, self._values = chosen.logarithmic, chosen.coordinates, chosen.at_coordinates
+        self._same = _SAME if chosen.present.structure.friction is None else _SAME_RUBBING
         self._held = self._weak = np.zeros((0, len(self._logarithmic)))
         self._count = self._linear = 0
         self._known: tuple[Any, FloatArray, FloatArray] | None = None
@@ -99,12 +101,9 @@ class Fit:
         """Search from given coordinates until a step gains nothing, or runs off; return where it ends, shape (P,)."""
         from scipy.optimize import least_squares
 
-        limits = self.predictor.parameters
-        with np.errstate(divide="ignore"):
-            bounds = [self._coordinates(np.maximum(ends, np.where(self._logarithmic, 0.0, -np.inf)))
-                      for ends in (limits.lower, limits.upper)]  # fmt: skip
+        bounds = self.predictor.parameters.coordinate_bounds
         x, rounds, spent, settled = np.clip(x, *bounds), 0, 0, False
-        leaps = self._stage == "last"
+        leaps, idle, best = self._stage == "last", 0, (np.inf, x, self._held)
         while rounds < _ROUNDS and spent < most:
             left, self._middle = min(most - spent, _PATIENCE), x
             if leaps:
@@ -125,8 +124,14 @@ class Fit:
                 x = self._leap(x, *bounds)
                 lowest = self._is_lowest(x, *bounds)
             self.message = "converged" if settled or lowest else f"not converged in {most} steps"
-            held = self._null(x)
+            held, cost = self._null(x), self._cost(x)
             if (lowest and len(held) == len(self._held)) or (not len(self._weak) and len(self._run_off(x))):
+                break
+            idle = 0 if cost < (1.0 - _GAINED) * best[0] else idle + 1
+            best = min(best, (cost, x, self._held), key=lambda one: one[0])
+            if idle == _IDLE:
+                x, self._held = best[1:]
+                self.message = f"not converged: the last of {spent} steps gained nothing"
                 break
             self._held = held
         return x
@@ -179,7 +184,7 @@ class Fit:
     def at_end(self) -> tuple[Prediction, FloatArray, FloatArray]:
         """Return the prediction at the end, the residuals of what counts, (rows,), and their Jacobian, (rows, P)."""
         x = self._coordinates(self.values)
-        prediction = self._at(x)
+        prediction = self.predictor.at(self._values(x))
         return prediction, self.weights.flat(prediction.differences()), self._slopes(x)
 
     def loss_slopes(self, residuals: FloatArray) -> FloatArray:
@@ -207,23 +212,13 @@ class Fit:
         found[self.prior.places] = (self._rates(x)[self.prior.places] / self.prior.std) ** 2
         return found
 
-    def _coordinates(self, values: FloatArray) -> FloatArray:
-        return np.where(self._logarithmic, np.log(np.where(self._logarithmic, values, 1.0)), values)
-
-    def _values(self, x: FloatArray) -> FloatArray:
-        with np.errstate(over="ignore"):  # the robot refuses what is infinite
-            return np.where(self._logarithmic, np.exp(np.where(self._logarithmic, x, 0.0)), x)
-
     def _rates(self, x: FloatArray) -> FloatArray:
         """Derivative of the parameters by their coordinates."""
         return np.where(self._logarithmic, self._values(x), 1.0)
 
-    def _at(self, x: FloatArray) -> Prediction:
-        return self.predictor.at(self._values(x))
-
     def _slopes(self, x: FloatArray) -> FloatArray:
         if self._known is None or self._known[0] is not self.predictor.change or not np.array_equal(self._known[1], x):
-            slopes = self.weights.flat(self._at(x).slopes()) * self._rates(x)
+            slopes = self.weights.flat(self.predictor.at(self._values(x)).slopes()) * self._rates(x)
             self._known = self.predictor.change, x, np.asarray(slopes)
         return self._known[2]
 
@@ -232,7 +227,7 @@ class Fit:
         if np.any(self._logarithmic & (np.abs(x - self._middle) > np.log(_FARTHEST))):
             return np.full(self._count, np.inf)
         try:
-            prediction = self._at(x)
+            prediction = self.predictor.at(self._values(x))
         except (SoftRobotsError, ArithmeticError):
             return np.full(self._count, np.inf)
         data = self.weights.flat(prediction.differences())
@@ -293,7 +288,7 @@ class Fit:
 
     def _refresh(self, x: FloatArray) -> None:
         self._exact_at = x
-        self._at(x)
+        self.predictor.at(self._values(x))
         self.predictor.refresh(self._values(x))
 
     def _null(self, x: FloatArray) -> FloatArray:

@@ -114,7 +114,7 @@ def identify(
         predictor = Predictor(chosen, rows)
         few = Predictor(chosen, rows[::every]) if every > 1 and _sees_all(rows, counted, every) else predictor
         told = counted if few is predictor else counted[::every]
-        values[0] = _mounted(few, values[0], told)
+        values[0] = mounted(few, values[0], told)
         weights = Weights.of(few.measurements.std, few.at(values[0]).differences(), told)
         if not len(weights.rows()):
             raise ParameterError("measurements", measurements, "with at least one number in a row that counts")
@@ -167,7 +167,7 @@ def _best(
     return best  # type: ignore[return-value]
 
 
-def _mounted(predictor: Predictor, values: FloatArray, counted: Any) -> FloatArray:
+def mounted(predictor: Predictor, values: FloatArray, counted: Any) -> FloatArray:
     """Return values, shape (P,), with the pose of the base that brings predicted positions nearest to the measured ones.
 
     By the singular value decomposition of their covariance: W. Kabsch, Acta Crystallographica A32:922-923, 1976. A fit that

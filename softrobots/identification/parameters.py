@@ -123,6 +123,22 @@ class ParameterSet:
         """Which change the model, shape (P,), truth values; the others change base, markers, actuator offsets or loads."""
         return np.array([one.place.kind in OF_MODEL for one in self.parameters], dtype=bool)
 
+    def coordinates(self, values: FloatArray) -> FloatArray:
+        """Return what is fitted at values, shape (P,): the logarithms of positive parameters, and the others."""
+        return np.where(self.logarithmic, np.log(np.where(self.logarithmic, values, 1.0)), values)
+
+    def at_coordinates(self, x: FloatArray) -> FloatArray:
+        """Return the values at such coordinates, shape (P,); infinite ones too, which the robot refuses."""
+        with np.errstate(over="ignore"):
+            return np.where(self.logarithmic, np.exp(np.where(self.logarithmic, x, 0.0)), x)
+
+    @cached_property
+    def coordinate_bounds(self) -> tuple[FloatArray, FloatArray]:
+        """Lower and upper bounds of the coordinates, each shape (P,)."""
+        with np.errstate(divide="ignore"):
+            lower = self.coordinates(np.where(self.logarithmic, np.maximum(self.lower, 0.0), self.lower))
+        return lower, self.coordinates(self.upper)
+
     @cached_property
     def direct_slopes(self) -> Mapping[str, FloatArray]:
         """Derivatives, 1 or 0, of what is set without changing the model, shape (size, P), by what has parameters.

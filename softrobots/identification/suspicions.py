@@ -2,13 +2,12 @@
 
 Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them. But
 where the rotation of the base is fitted, it hides most of a swapped axis, and other parameters hide reversed commands. Then
-slopes by commands are compared with those of the robot as it was given, and the whole fit is done again to other numbers, see
+linear steps from the robot as it was given tell the signs, and the whole fit is done again to other numbers, see
 `softrobots.identification.refits`.
 """
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Sequence
 from typing import Any
@@ -17,12 +16,13 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
+from softrobots.core.errors import SoftRobotsError
 from softrobots.identification.identification import Identification
-from softrobots.identification.identify import identify
+from softrobots.identification.identify import mounted
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
-from softrobots.identification.refits import STEPS, load_units, other_axes, other_loads, rescaled, value_units
+from softrobots.identification.refits import load_units, other_axes, other_loads, rescaled, value_units
 from softrobots.model.soft_model import SoftModel, check_model
 
 FACTORS = (
@@ -43,7 +43,7 @@ FAR_LESS = 0.25
 
 _FEWEST = 4  # rows
 _MOST_SOLVED = 50  # rows in which other frames are tried
-_MOST_REVERSED = 12  # actuators of which any may be reversed: so many bits are tried
+_TOLD_APART = 1e-3  # singular value, relative, of a combination of parameters in a linear step
 _SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; other parameters are not right yet either
 _MUCH = 0.1  # share of the variance that no robot with the right columns leaves
 _TO_STD = 1.4826  # standard deviation of normal numbers over the median of their size
@@ -198,32 +198,43 @@ def _other_frame(found: Identification, key: str, rows: Measurements, before: fl
 def _reversed_actuators(found: Identification, key: str, few: slice) -> list[str]:
     """The actuators whose reversal explains far more of positions, if any are: what else is fitted hides them.
 
-    Slopes `M` by commands are compared with those of the robot as it was given, `P`, whatever turn `R` the base has. With the
-    commands' squares :math:`q^T q = L L^T` and over signs `S`, :math:`|(M - R P S) L|^2` is least where the sum of singular
-    values of :math:`P S L L^T M^T` is largest (Wahba 1965).
+    Each choice of signs counts by what one linear step of all parameters would leave, from where the fit started but for the
+    pose of the base. One sign after another is changed for the one that leaves least.
     """
-    rows, base = found.fitted.measurements[few], [name for name in found.names if name.startswith("base.")]
-    if not base:
+    rows = found.fitted.measurements[few]
+    chosen = ParameterSet.of(found.model, found.names, rows.markers)
+    start = ParameterSet.of(chosen.model([one.value for one in found.parameters]), found.names, rows.markers)
+    n, middle = rows.q_motors.shape[1], 0.0 if rows.relative else start.present.relaxed_motors
+    points = _points(rows.measured[key])
+    whole = float(np.sum(_centred(points[_known(points, points)]) ** 2))
+    if Predictor(start, rows).by_differences:  # which would take minutes
         return []
-    fit = identify(found.model, rows, ParameterSet.of(found.model, base, rows.markers), max_iterations=STEPS)
-    measured, predicted = _points(rows.measured[key]), _points(fit.fitted.predicted[key])
-    known = _known(measured, predicted)
-    q, n = _centred(rows.q_motors[known]), rows.q_motors.shape[1]
-    if not 2 * n < len(q) or n > _MOST_REVERSED or np.linalg.matrix_rank(q) < n:
+
+    def left(signs: FloatArray) -> float:
+        given = rows.arguments() | {"q_motors": middle + (rows.q_motors - middle) * signs}
+        try:
+            predictor = Predictor(start, Measurements(**given))
+            values = mounted(predictor, start.values, rows.mask)
+            predictor.refresh(values)
+            one = predictor.at(values).seen[key]
+            error, slopes = one.difference[:, :3], one.slopes()[:, :3]
+        except SoftRobotsError:
+            return math.inf
+        error, slopes = error[np.isfinite(error)], slopes[np.isfinite(error)]
+        slopes /= np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+        return float(np.sum((error - slopes @ np.linalg.lstsq(slopes, error, rcond=_TOLD_APART)[0]) ** 2)) / whole
+
+    signs, shares = np.ones(n), [left(np.ones(n))]
+    while len(shares) <= n:
+        tried = [signs * np.where(np.arange(n) == place, -1.0, 1.0) for place in range(n)]
+        each = [left(one) for one in tried]
+        if not min(each) < shares[-1]:
+            break
+        signs, shares = tried[int(np.argmin(each))], [*shares, min(each)]
+    if not (shares[0] > UNEXPLAINED and shares[-1] < FAR_LESS * shares[0]):
         return []
-    root = np.linalg.cholesky(q.T @ q).T
-    slopes, expected = (np.linalg.lstsq(q, _centred(values[known]), rcond=None)[0].T for values in (measured, predicted))
-    signs = np.array(sorted(itertools.product((1.0, -1.0), repeat=n), key=sum, reverse=True))
-    mine, theirs = slopes @ root.T, (expected * signs[:, None]) @ root.T
-    turned, sizes, back = np.linalg.svd(mine @ theirs.transpose(0, 2, 1))
-    sizes[:, 2] *= np.linalg.det(turned @ back)
-    whole = np.sum(mine**2)
-    shares = (whole + np.sum(theirs**2, axis=(1, 2)) - 2.0 * sizes.sum(axis=1)) / whole
-    best = int(np.argmax(shares <= shares.min() + 0.1 * UNEXPLAINED))  # of nearly equal ones that with the fewest
-    if not (shares[0] > UNEXPLAINED and shares[best] < FAR_LESS * shares[0]):
-        return []
-    order = ", ".join(str(int(number * sign)) for number, sign in enumerate(signs[best], start=1))
-    return [f"{key}: taking the actuators as {order} {_words(shares[best], shares[0])} that follows them"]
+    order = ", ".join(str(int(number * sign)) for number, sign in enumerate(signs, start=1))
+    return [f"{key}: taking the actuators as {order} {_words(shares[-1], shares[0])}, after a linear step of the fit"]
 
 
 def _points(values: FloatArray) -> FloatArray:
