@@ -131,7 +131,7 @@ class Fit:
             best = min(best, (cost, x, self._held), key=lambda one: one[0])
             if idle == _IDLE:
                 x, self._held = best[1:]
-                self.message = f"not converged: the last of {spent} steps gained nothing"
+                self.message = self.message if settled else f"not converged: the last of {spent} steps gained nothing"
                 break
             self._held = held
         return x
