@@ -73,11 +73,14 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
             texts += other_axes(found, key, few, progress) if len(texts) == before else []
         if key.startswith(("positions.", "poses.")) and (left > UNEXPLAINED or rescaled(found)) and not texts:
             texts += other_loads(found, key, few, progress)
-        if len(texts) == before and (share := _unexplained(measured, predicted)) > _MUCH:
+        share = _unexplained(measured, predicted)
+        if len(texts) == before and left > _MUCH:
             texts.append(
                 f"{key}: {100.0 * share:.2g} % of the variance are left unexplained: are order and signs of the actuators "
                 "right, and is all fitted that may differ?"
             )
+        elif len(texts) == before and found.loss == "linear" and share > _MUCH:
+            texts.append(f'{key}: outliers leave {100.0 * share:.2g} % of the variance: mask them, or give a loss, "cauchy"')
         if key in rows.std:
             sizes = np.abs(found.residuals[key] / rows.std[key])
             ratio = _TO_STD * float(np.median(sizes[np.isfinite(sizes)]))
