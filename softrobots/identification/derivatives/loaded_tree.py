@@ -267,7 +267,9 @@ def _turning(wrenches: FloatArray) -> FloatArray:
 def _placed(tree: Topology, joints: FloatArray) -> FloatArray:
     """Placement of each joint, and of the base, in the world, shape (N, n + 1, 4, 4)."""
     q = joints.T
-    motion = np.stack([np.ones_like(q), np.sin(q), 1.0 - np.cos(q), q], axis=-1)
+    motion: FloatArray = np.ones((*q.shape, 4))
+    motion[..., 1], motion[..., 3] = np.sin(q), q
+    motion[..., 2] -= np.cos(q)
     own = (motion @ tree.motions).reshape(*q.shape, 4, 4)
     placed = np.zeros((len(q) + 1, q.shape[1], 4, 4))
     placed[-1] = np.eye(4)
