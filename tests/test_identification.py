@@ -153,11 +153,15 @@ def test_what_twelve_tips_tell_weakly_comes_back_too() -> None:
     np.testing.assert_allclose(found.solution, true, rtol=1e-9)
 
 
-def test_masses_that_are_told_only_together_end_at_the_lowest_point_within_their_bounds() -> None:
-    """A valley that bends in the logarithm of the density; along it the cap would lose more than it weighs."""
+@pytest.mark.parametrize("count", [40, 120])
+def test_masses_that_are_told_only_together_end_at_the_lowest_point_within_their_bounds(count: int) -> None:
+    """A valley that bends in the logarithm of the density; along it the cap would lose more than it weighs, with few rows.
+
+    Of more than a hundred rows a few are fitted first, and full steps of all of them begin there.
+    """
     names, true = ("stiffness", "density", "cap_mass"), [150.0, 1500.0, 0.13]
     data = measured(
-        ParameterSet.of(ARM, names), true, *rows(40, (0.9, 0.9, 0.9), 3.0), std=1e-3, seed=4, seen=("tip_position",)
+        ParameterSet.of(ARM, names), true, *rows(count, (0.9, 0.9, 0.9), 3.0), std=1e-3, seed=4, seen=("tip_position",)
     )
     found = sr.identify(ARM, data, names)
     assert found.message == "converged"
@@ -168,7 +172,7 @@ def test_masses_that_are_told_only_together_end_at_the_lowest_point_within_their
 
     at = np.append(found.solution[:2], max(found.solution[2], 1e-9)) / true
     theirs = least_squares(residuals, at, bounds=(0.0, np.inf), xtol=1e-12, ftol=1e-12, gtol=1e-12, x_scale=1e-3)
-    assert found.solution[2] == pytest.approx(0.0, abs=1e-9)
+    assert count > 40 or found.solution[2] == pytest.approx(0.0, abs=1e-9)
     assert np.sum(residuals(found.solution / true) ** 2) <= 2.0 * theirs.cost * (1.0 + 1e-6)  # 1e-8 is where fits end
 
 
