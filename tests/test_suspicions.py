@@ -155,6 +155,15 @@ def test_positions_that_nothing_explains_are_told_with_their_share(tips: Any) ->
     assert size == pytest.approx(left.std() / 0.02, rel=0.5)  # the median of 120 numbers that are not quite normal
 
 
+def test_rows_far_off_are_told_as_outliers_and_not_as_wrong_actuators(tips: Any) -> None:
+    arm, seen = sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.3))), tips + 1e-3 * RNG.standard_normal(tips.shape)
+    seen[3] += 3.0
+    rows = sr.Measurements(MOTORS, tip_position=seen, gravity=(0, 0, -9.81))
+    (found,) = hints(sr.identify(arm, rows, "base.position"))
+    assert found.startswith("positions.tip: outliers leave ")
+    assert hints(sr.identify(arm, rows, "base.position", loss="cauchy")) == []
+
+
 def test_the_recordings_are_not_doubted() -> None:
     folder = CHECKOUT / "docs" / "examples" / "tdcr_v4"
     rows = sr.Measurements.from_csv(folder / "train.csv", folder / "columns.yaml")
