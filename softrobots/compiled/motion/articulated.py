@@ -11,8 +11,7 @@ one rigid body would, with an inertia of 6 x 6. With the inertia `C_j` of the bo
 
 and the group hands on `I - U G^{-1} U^T`. The moments `c_j` are how forces that keep their direction change the torque of a
 joint where all nearer to the base turns, as in `softrobots.compiled.chain.elements`. Forces of the bodies nearly do, and with
-this part of the stiffness the corrections of a step shrink by a factor of a thousand each instead of fifty. Where both stages
-of a step have a matrix of their own, the two make one real matrix, symmetric once the rows of the second change their sign.
+this part of the stiffness the corrections of a step shrink by a factor of a thousand each instead of fifty.
 """
 
 from __future__ import annotations
@@ -97,20 +96,13 @@ def moved_acceleration(acceleration: Vector, by: Vector) -> Vector:
     return np.concatenate([acceleration[:3], acceleration[3:] + cross(acceleration[:3], by)])
 
 
-def moved_inertia(inertia: Any, by: Sequence[Vector]) -> Any:
-    """Return an inertia of all stages, shape (6 k, 6 k), about points that are `by` nearer to the base at each stage (k)."""
-    moved, levers = inertia.copy(), [skew(one) for one in by]
-    for i, j in upper_triangle(len(by)):
-        rows, columns = slice(6 * i, 6 * i + 6), slice(6 * j, 6 * j + 6)
-        one = inertia[rows, columns]
-        linear, mixed = one[3:, 3:], one[:3, 3:] + levers[i] @ one[3:, 3:]
-        angular = one[:3, :3] - mixed @ levers[j] + levers[i] @ one[3:, :3]
-        below = one[3:, :3] - linear @ levers[j]
-        if i == j:  # symmetric, but its halves are rounded differently
-            angular, below = symmetric([angular[index] for index in upper_triangle(3)], 3), mixed.T
-        moved[rows, columns] = np.block([[angular, mixed], [below, linear]])
-        moved[columns, rows] = moved[rows, columns].T
-    return moved
+def moved_inertia(inertia: Any, by: Vector) -> Any:
+    """Return an inertia, shape (6, 6), about a point that is `by` nearer to the base."""
+    lever, linear = skew(by), inertia[3:, 3:]
+    mixed = inertia[:3, 3:] + lever @ linear
+    angular = inertia[:3, :3] - mixed @ lever + lever @ inertia[3:, :3]
+    angular = symmetric([angular[index] for index in upper_triangle(3)], 3)  # its halves are rounded differently
+    return np.block([[angular, mixed], [mixed.T, linear]])
 
 
 @dataclass
@@ -153,60 +145,45 @@ class Pull:
         return self.spread @ joint.axis - joint.axis * sum(np.diag(self.spread), 0.0)
 
 
-def articulate(
-    inertia: Any, pulls: Sequence[Pull], stages: Sequence[GroupMotion], own: Any, quarter: Any
-) -> tuple[ArticulatedGroup, Any, list[Pull]]:
+def articulate(inertia: Any, pull: Pull, motion: GroupMotion, own: Any, quarter: Scalar) -> tuple[ArticulatedGroup, Any, Pull]:
     """Eliminate the coordinates of a group of joints.
 
     Args:
-        inertia: Inertia of all beyond at all stages, about the origin of the next group, shape (6 k, 6 k).
-        pulls: Forces on all beyond, from there, at each stage (k).
-        stages: The group at each stage.
-        own: `h/2 D + h^2/4 K` of the coordinates themselves, with that of tensions along the group, shape (k m, k m).
-        quarter: `h^2/4` [s^2], or what it is for two stages, shape (k, k).
+        inertia: Inertia of all beyond, about the origin of the next group, shape (6, 6).
+        pull: Forces on all beyond, from there.
+        motion: The group.
+        own: `h/2 D + h^2/4 K` of the coordinates themselves, with that of tensions along the group, shape (m, m).
+        quarter: `h^2/4` [s^2].
 
     Returns:
         The factors, and inertia and forces from the origin of the group.
     """
-    k, (n, m), reach = len(stages), stages[0].slopes.shape, [one.reach for one in stages]
-    inertia, pulls = moved_inertia(inertia, reach), [pull.moved(by) for pull, by in zip(pulls, reach, strict=True)]
-    shifts = [constants(np.zeros(3)) for _ in stages]
-    motions = constants(np.zeros((6 * k, k * n)))  # angular and linear velocity of the end by each joint
+    n, m = motion.slopes.shape
+    inertia, pull = moved_inertia(inertia, motion.reach), pull.moved(motion.reach)
+    shift = constants(np.zeros(3))
+    motions = constants(np.zeros((6, n)))  # angular and linear velocity of the end by each joint
     pushes = motions.copy()  # moment and force by its acceleration, and by the turn of all nearer to the base
-    products = constants(np.zeros((k * n, k * n)))
+    products = constants(np.zeros((n, n)))
     for number in reversed(range(n)):
-        joints = [one.joints[number] for one in stages]
-        for stage, joint in enumerate(joints):
-            part = slice(6 * stage, 6 * stage + 6)
-            inertia[part, part] = inertia[part, part] + inertia_of(joint.body, joint.axes) * (-1.0) ** stage
-            pulls[stage] = pulls[stage].with_force(joint.force, joint.axes @ joint.body.centre)
-        bends = [pull.bend(joint) for pull, joint in zip(pulls, joints, strict=True)]
-        for stage, joint in enumerate(joints):
-            column, first = n * stage + number, 6 * stage
-            turns = slice(first, first + 3) if joint.shift is None else slice(first + 3, first + 6)
-            pushes[:, column] = inertia[:, turns] @ joint.axis
-            for row, bend in enumerate(bends):
-                turned = bend if row == stage else (bend + bends[stage]) * 0.5
-                pushes[6 * row : 6 * row + 3, column] += turned * quarter[row, stage]
-            motions[turns, column] = joint.axis
-            if joint.shift is None:
-                motions[first + 3 : first + 6, column] = cross(joint.axis, shifts[stage])
-        for row, stage in np.ndindex(k, k):
-            for place in range(n * stage + number, n * stage + n):
-                one = joints[row].load(pushes[6 * row : 6 * row + 6, place])
-                products[n * row + number, place] = products[place, n * row + number] = one
-        by = [joint.shift for joint in joints]
-        if by[0] is not None:
-            inertia, pulls = moved_inertia(inertia, by), [pull.moved(one) for pull, one in zip(pulls, by, strict=True)]
-            shifts = [one + other for one, other in zip(shifts, by, strict=True)]
-            pushes = np.stack([at_stages(moved_wrench, push, by) for push in pushes.T], axis=1)
-    slopes = constants(np.zeros((k * n, k * m)))
-    for stage, motion in enumerate(stages):
-        slopes[n * stage : n * stage + n, m * stage : m * stage + m] = motion.slopes
-    block, none = slopes.T @ (products @ slopes) + own, constants(np.zeros((6 * k, k * m)))
-    eliminated, rest = eliminate(Outboard(-inertia, [], 1.0, 0.0), none, -(pushes @ slopes), block, [], [1.0] * k * m)
+        joint = motion.joints[number]
+        inertia = inertia + inertia_of(joint.body, joint.axes)
+        pull = pull.with_force(joint.force, joint.axes @ joint.body.centre)
+        turns = slice(3) if joint.shift is None else slice(3, 6)
+        pushes[:, number] = inertia[:, turns] @ joint.axis
+        pushes[:3, number] += pull.bend(joint) * quarter
+        motions[turns, number] = joint.axis
+        if joint.shift is None:
+            motions[3:, number] = cross(joint.axis, shift)
+        for place in range(number, n):
+            products[number, place] = products[place, number] = joint.load(pushes[:, place])
+        if joint.shift is not None:
+            inertia, pull, shift = moved_inertia(inertia, joint.shift), pull.moved(joint.shift), shift + joint.shift
+            pushes = np.stack([moved_wrench(push, joint.shift) for push in pushes.T], axis=1)
+    slopes = motion.slopes
+    block, none = slopes.T @ (products @ slopes) + own, constants(np.zeros((6, m)))
+    eliminated, rest = eliminate(Outboard(-inertia, [], 1.0, 0.0), none, -(pushes @ slopes), block, [], [1.0] * m)
     gain = eliminated.coupling * vector(eliminated.inverse_pivots)[:, None]
-    return ArticulatedGroup(eliminated, gain, motions @ slopes, shifts, reach), -rest.matrix, pulls
+    return ArticulatedGroup(eliminated, gain, motions @ slopes, [shift], [motion.reach]), -rest.matrix, pull
 
 
 def carried_inward(group: ArticulatedGroup, gradient: Sequence[Scalar], beyond: Vector) -> tuple[list[Scalar], Vector]:
@@ -232,5 +209,7 @@ def carried_inward(group: ArticulatedGroup, gradient: Sequence[Scalar], beyond: 
 def carried_outward(group: ArticulatedGroup, yielded: Vector, before: Vector) -> tuple[Vector, Vector]:
     """Return the corrections of the coordinates of a group, and the acceleration of the next that they give, shape (6 k,)."""
     after = at_stages(moved_acceleration, before, group.shift)
-    steps = group.eliminated.raised(group.gain @ before - yielded)
+    first = len(before) // 2  # two sums, as each addition waits for the one before it
+    turned = group.gain[:, :first] @ before[:first] + group.gain[:, first:] @ before[first:]
+    steps = group.eliminated.raised(turned - yielded)
     return steps, at_stages(moved_acceleration, after + group.motions @ steps, group.reach)

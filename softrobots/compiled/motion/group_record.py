@@ -14,9 +14,9 @@ from softrobots.compiled.trace.expressions import Expression, Scalar
 class GroupRecord:
     """Values of a group for later passes, in the workspace from `at` on, of a function with a loop at all `stages`."""
 
-    def __init__(self, stages: int) -> None:
-        """Begin without values."""
-        self.size = 0
+    def __init__(self, stages: int, first: int = 0) -> None:
+        """Begin without values, behind the first places."""
+        self.size = first
         self._stages = stages
         self._kept: dict[tuple[str, int], Expression] = {}
 

@@ -39,6 +39,7 @@ from softrobots.compiled.motion.motion_groups import (
 )
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import MovingFrame, moved, wrench
+from softrobots.compiled.motion.stage_pairs import STEPS, Factors, PairPlaces, compose, part_blocks, pivot
 from softrobots.compiled.trace.blocks import Block, TableColumns
 from softrobots.compiled.trace.complex_numbers import of_parts, parts_of, symmetric_form
 
@@ -63,9 +64,9 @@ class GroupLayout:
     origin: int = field(init=False)
     """Position of its origin, where the tip is asked for [m] (3)."""
     inertia: int = field(init=False)
-    """Articulated inertia of all stages, upper triangle by columns (21, or 78 of two stages)."""
+    """Articulated inertia of all beyond, upper triangle by columns (21, or real parts and imaginary ones)."""
     pull: int = field(init=False)
-    """Forces on all beyond: their sum, and the products of levers and forces (12), stage by stage."""
+    """Forces on all beyond: their sum, and the products of levers and forces (12)."""
     wrench: int = field(init=False)
     """Moment and force that all bodies beyond need (6, stages)."""
     sums: int = field(init=False)
@@ -90,7 +91,7 @@ class GroupLayout:
     def __post_init__(self) -> None:
         """Compute the places."""
         n, s = self.unknowns, self.stages
-        passes = dict(frame=18 * s, origin=3, inertia=3 * s * (6 * s + 1), pull=12 * s, wrench=6 * s, sums=6 * s, answer=6 * s)
+        passes = dict(frame=18 * s, origin=3, inertia=21 * s, pull=12, wrench=6 * s, sums=6 * s, answer=6 * s)
         state = dict(coordinates=3 * self.free * s, state=4 * n * s if s > 1 else 0)
         assign_places(self, self.first, **passes, base=18, cosine=n * s, sine=n * s, **state, bounds=2, end=0)
 
@@ -105,7 +106,7 @@ class GroupLayout:
         return None if self.stages == 1 else ("stage", self.stages)
 
 
-def group_kinds(plan: MotionPlan, places: GroupLayout) -> list[Kind]:
+def group_kinds(plan: MotionPlan, places: GroupLayout, pairs: PairPlaces | None) -> list[Kind]:
     """Trace the code of every kind of group; `rows` of a kind are the first elements of its groups."""
     kinds: dict[Any, list[tuple[int, ...]]] = {}
     parts = moving_parts(plan.unknowns)
@@ -113,20 +114,26 @@ def group_kinds(plan: MotionPlan, places: GroupLayout) -> list[Kind]:
         rubbing = group_rubbing(plan.unknowns, group)
         signature = *(group_signature(plan.unknowns, row, parts[row]) for row in group), rubbing and rubbing.places
         kinds.setdefault(signature, []).append(group)
-    return [_trace_kind(number, groups, plan, places, parts) for number, groups in enumerate(kinds.values())]
+    return [_trace_kind(number, groups, plan, places, pairs, parts) for number, groups in enumerate(kinds.values())]
 
 
 def _trace_kind(
-    number: int, groups: list[tuple[int, ...]], plan: MotionPlan, places: GroupLayout, parts: Sequence[ElementParts]
+    number: int,
+    groups: list[tuple[int, ...]],
+    plan: MotionPlan,
+    places: GroupLayout,
+    pairs: PairPlaces | None,
+    parts: Sequence[ElementParts],
 ) -> Kind:
     names = ("at", "row", "q")
     out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names, loop=places.loop)
     resist = back = Block(f"resist_{number}", "Inward pass: torques out of balance.", names, out.trace, loop=places.loop)
     place = Block(f"place_{number}", "Outward pass with positions alone.", names, out.trace)
     stages, columns = places.stages, TableColumns(out, f"GROUP_{number}", len(groups))
-    record = GroupRecord(stages)
     group = MovingGroup(plan, out, groups, columns, parts, places.state if stages > 1 else None)
-    moving = _trace_move(out, record, places, group)
+    both = Factors(len(group.own))
+    record = GroupRecord(stages, both.size if pairs else 0)
+    moving, end = _trace_move(out, record, places, pairs, group)
     total, loads = moved_wrench(vector(back.spaced(places.wrench, 6, stages, back.each())), moving.reach), []
     for joint, own in zip(moving.joints[::-1], moving.wrenches[::-1], strict=True):
         total = total + own
@@ -140,14 +147,23 @@ def _trace_kind(
         back.store_spaced(written, gradient, stages, back.each(plan.row("q")))
         sides = [vector(back.spaced(read + stage, len(gradient), stages, plan.row("q"))) for stage in range(stages)]
         gradient = right_hand_side(*sides) if layout.in_stages else [*sides[0]]
+    quarter = plan.factors(out)[1] * (1.0 / plan.massive(out))
     for coupled, (factoring, reducing, correcting) in enumerate(SOLVERS[: 1 + plan.couples]):
-        factor = Block(f"{factoring}_{number}", "Inward pass: articulated inertia and factors.", names, out.trace)
         step = Block(f"{correcting}_{number}", "Outward pass: correction of the accelerations.", names, out.trace)
         if plan.reduces:
             back = Block(f"{reducing}_{number}", "Inward pass: elimination of the torques at all stages.", names, out.trace)
             blocks.append(back)
-        at, m = [moving.at(record, factor, stage) for stage in range(0 if coupled else stages - 1, stages)], len(gradient)
-        factors, is_complex = _trace_factors(factor, record, plan, places, group, at), layout.in_stages and not coupled
+        m, is_complex = len(gradient), layout.in_stages and not coupled
+        if coupled and pairs is not None:
+            first = Block(f"{STEPS[0]}_{number}", "Forces by accelerations of the group.", names, out.trace, loop=places.loop)
+            compose(first, pairs, moving, end)
+            factor = Block(f"{STEPS[2]}_{number}", "Factor the coordinates of the group.", names, out.trace)
+            pivot(factor, pairs, both, [symmetric_form(one) for one in group.own], symmetric_form(quarter))
+            factors = both.group(back)
+            blocks += [first, *part_blocks(pairs, both)]
+        else:
+            factor = Block(f"{factoring}_{number}", "Inward pass: articulated inertia and factors.", names, out.trace)
+            factors = _trace_factors(factor, record, plan, places, group, moving.at(record, factor, stages - 1))
         side = [-one if place >= m else one for place, one in enumerate(parts_of(gradient))] if coupled else gradient
         yielded, sums = carried_inward(factors, side, _loaded(back, places.sums, 6 * stages, is_complex))
         back.store_all(places.sums, parts_of(sums) if is_complex else sums)
@@ -169,8 +185,12 @@ def _loaded(block: Block, place: int, count: int, is_complex: bool) -> Vector:
     return vector(of_parts(values) if is_complex else values)
 
 
-def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: MovingGroup) -> GroupMotion:
+def _trace_move(
+    out: Block, record: GroupRecord, places: GroupLayout, pairs: PairPlaces | None, group: MovingGroup
+) -> tuple[GroupMotion, Vector]:
+    """Trace the outward pass; return what reads what it keeps, and where the group ends, from the base."""
     frame = load_frame(out, places.frame, places.stages, out.each())
+    end = constants(np.zeros(3)) if pairs is None else vector(out.spaced(pairs.point, 3, 2, out.each()))
     states, slopes = group.joints(out, places.cosine, places.sine)
     turns = {place: element.rotation for place, element in enumerate(group.elements)}
     joints, wrenches = [], []
@@ -178,6 +198,7 @@ def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: Mov
         if place in turns:
             frame = replace(frame, axes=frame.axes @ turns[place])
         frame, axis, shift = moved(frame, state)
+        end = end if shift is None else end + shift
         wrenches.append(record.keep(out, np.concatenate(wrench(frame, body)[::-1])))
         kept_shift = None if shift is None else record.keep(out, shift)
         axes, needed = constants(np.zeros((3, 3))), body.needed_axes
@@ -186,33 +207,31 @@ def _trace_move(out: Block, record: GroupRecord, places: GroupLayout, group: Mov
     frame = replace(frame, axes=frame.axes @ group.turn)
     reach = frame.axes @ group.reach
     store_frame(out, places.frame, frame.shifted(range(3), group.reach), places.stages, out.each())
-    return GroupMotion(joints, wrenches, *(record.keep(out, one) for one in (reach, slopes, vector(group.torques))))
+    if pairs is not None:
+        out.store_spaced(pairs.point, end + reach, 2, out.each())
+        end = record.keep(out, end)
+    return GroupMotion(joints, wrenches, *(record.keep(out, one) for one in (reach, slopes, vector(group.torques)))), end
 
 
 def _trace_factors(
-    factor: Block, record: GroupRecord, plan: MotionPlan, places: GroupLayout, group: MovingGroup, stages: Sequence[GroupMotion]
+    factor: Block, record: GroupRecord, plan: MotionPlan, places: GroupLayout, group: MovingGroup, motion: GroupMotion
 ) -> ArticulatedGroup:
     """Trace the factors of a group; return what reads them and copies of what the next outward pass overwrites."""
-    k, m, quarter = len(stages), len(group.own), plan.factors(factor)[1] * (1.0 / plan.massive(factor))
-    is_complex, form = k < places.stages, symmetric_form if k > 1 else (lambda value: vector([value])[:, None])
-    count = 3 * k * (6 * k + 1)
-    inertia = symmetric(_loaded(factor, places.inertia, count * (1 + is_complex), is_complex), 6 * k)
-    levers = [vector(factor.loads(places.pull + 12 * stage + 3, 9)).reshape(3, 3) for stage in range(k)]
-    pulls = [Pull(vector(factor.loads(places.pull + 12 * stage, 3)), one) for stage, one in enumerate(levers)]
-    own = constants(np.zeros((k * m, k * m)))
-    for place, value in enumerate(group.own):
-        own[place::m, place::m] = form(value)
-    for (row, column), value in group.curvatures.items():  # of routes, which one matrix is for
+    quarter, is_complex = plan.factors(factor)[1] * (1.0 / plan.massive(factor)), plan.layout.in_stages
+    inertia = symmetric(_loaded(factor, places.inertia, 21 * (1 + is_complex), is_complex), 6)
+    pull = Pull(vector(factor.loads(places.pull, 3)), vector(factor.loads(places.pull + 3, 9)).reshape(3, 3))
+    own = np.diag(vector(group.own))
+    for (row, column), value in group.curvatures.items():
         own[row, column] = own[column, row] = own[row, column] + value * quarter
-    found, inertia, pulls = articulate(inertia, pulls, stages, own, form(quarter))
-    triangle = [inertia[index] for index in upper_triangle(6 * k)]
+    found, inertia, pull = articulate(inertia, pull, motion, own, quarter)
+    triangle = [inertia[index] for index in upper_triangle(6)]
     factor.store_all(places.inertia, parts_of(triangle) if is_complex else triangle)
-    for stage, pull in enumerate(pulls):
-        factor.store_all(places.pull + 12 * stage, [*pull.force, *pull.spread.ravel()])
+    factor.store_all(places.pull, [*pull.force, *pull.spread.ravel()])
     one = found.eliminated
     lower, inverses = (record.keep(factor, part) for part in (one.lower, one.inverse_pivots))
-    copies = (record.keep(factor, part) for part in (found.gain, found.motions, found.shift, found.reach))
-    return ArticulatedGroup(Eliminated(lower, inverses.tolist(), one.coupling, []), *copies)
+    copies = (record.keep(factor, part) for part in (found.gain, found.motions, *found.shift, *found.reach))
+    gain, motions, shift, reach = copies
+    return ArticulatedGroup(Eliminated(lower, inverses.tolist(), one.coupling, []), gain, motions, [shift], [reach])
 
 
 def _trace_place(block: Block, places: GroupLayout, group: MovingGroup, strains: int) -> None:

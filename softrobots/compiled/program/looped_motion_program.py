@@ -15,12 +15,14 @@ from softrobots.compiled.motion.looped_motion import SOLVERS, GroupLayout, group
 from softrobots.compiled.motion.motion_groups import motion_groups, reach_behind
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import MovingFrame, joint_state, moved
+from softrobots.compiled.motion.stage_pairs import STEPS, PairPlaces, start_pairs
 from softrobots.compiled.program.generated_module import functions_of, text_of
 from softrobots.compiled.program.looped_program import loop_text
 from softrobots.compiled.program.motion_actuators import actuator_parts
 from softrobots.compiled.program.motion_control import control_text
 from softrobots.compiled.program.motion_parts import MotionParts
 from softrobots.compiled.trace.blocks import Block
+from softrobots.compiled.trace.complex_numbers import symmetric_form
 from softrobots.compiled.trace.expressions import cosine, sine
 
 _PASSES = {
@@ -44,8 +46,10 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     first, free = (layout.prepared, 0) if routes is None else (routes.end, layout.unknowns * (in_stages and routes.held))
     places = GroupLayout(first, n, free, 2 if in_stages else 1)
     actuators = None if routes is None else actuator_parts(plan, routes)
-    kinds = group_kinds(plan, places)
-    record, sequence = places.end, {}
+    most = max(sum(len(unknowns.moving(row)) for row in group) for group in motion_groups(unknowns))
+    pairs = PairPlaces(places.end, most) if plan.couples else None
+    kinds = group_kinds(plan, places, pairs)
+    record, sequence = places.end if pairs is None else pairs.end, {}
     calls: dict[str, list[tuple[int, str]]] = {name: [] for name in passes}
     for kind in kinds:
         for place, row in enumerate(kind.rows):
@@ -53,8 +57,11 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
             first = unknowns.place[unknowns.moving(row)[0]] if motor is None else motor
             sequence[row] = (kind.number, record, place * kind.columns.width, first)
             record += kind.record
+        names = [block.name for block in kind.blocks]
         for name, pass_calls in calls.items():
-            pass_calls.append((kind.number, f"{name}_{kind.number}(w, AT[i], ROW[i], PLACE[i])"))
+            steps = STEPS if name == "couple" else [name]
+            own = [one for step in steps for one in names if one.rpartition("_")[0] == step]
+            pass_calls += [(kind.number, f"{one}(w, AT[i], ROW[i], PLACE[i])") for one in own]
     bends = any(unknowns.traced(row).kind == "turn" and unknowns.traced(row).moving for row in sequence)
     tables: dict[str, object] = {"FIRST": places.bounds, "COUNT": places.bounds + 1, "N_ELEMENTS": len(sequence)}
     tables |= {f"GROUP_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
@@ -62,13 +69,14 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     tables |= dict(zip(("KIND", "AT", "ROW", "PLACE"), zip(*ordered, strict=True), strict=True))
     frame = [
         _prepare(plan, places, len(ordered)),
-        _start_move(places),
+        _start_move(places, pairs),
         *([_bend(places, places.state if in_stages else plan.strains[0])] if bends else []),
         _start_articulate(plan, places),
         _start_resist(plan, places),
         _start_place(plan, places, len(ordered)),
         _finish_place(plan, places),
         *_stage_blocks(plan, places),
+        *([] if pairs is None else [_start_couple(plan, pairs)]),
         *([] if actuators is None else [_start_reduce(places), *actuators.blocks]),
         *([_add_mass(plan, places)] if layout.full_damping else []),
     ]
@@ -89,7 +97,8 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         ]
         for suffix, flag in (("", "w[COUPLED]"), ("_lanes", "w[COUPLED * LANES]"))
     )
-    return MotionParts([*frame, *(block for kind in kinds for block in kind.blocks)], record, tables, loops, lane_loops)
+    blocks = {block.name: block for block in (*frame, *(block for kind in kinds for block in kind.blocks))}
+    return MotionParts([*blocks.values()], record, tables, loops, lane_loops)
 
 
 def _prepare(plan: MotionPlan, places: GroupLayout, count: int) -> Block:
@@ -108,10 +117,18 @@ def _prepare(plan: MotionPlan, places: GroupLayout, count: int) -> Block:
     return block
 
 
-def _start_move(places: GroupLayout) -> Block:
+def _start_move(places: GroupLayout, pairs: PairPlaces | None) -> Block:
     block = Block("start_move", "Start at the base.")
     for stage in range(places.stages):
         store_frame(block, places.frame + stage, load_frame(block, places.base), places.stages)
+    block.store_all(0 if pairs is None else pairs.point, [0.0] * (0 if pairs is None else 6))
+    return block
+
+
+def _start_couple(plan: MotionPlan, pairs: PairPlaces) -> Block:
+    block = Block("start_couple", "Start at the tip with its force, without bodies beyond.")
+    quarter = symmetric_form(plan.factors(block)[1] * (1.0 / plan.massive(block)))
+    start_pairs(block, pairs, _tip_force(plan, block), quarter)
     return block
 
 
@@ -150,7 +167,7 @@ def _bend(places: GroupLayout, strains: int) -> Block:
 def _start_articulate(plan: MotionPlan, places: GroupLayout) -> Block:
     block = Block("start_articulate", "Start at the tip with its force, without bodies beyond.")
     block.store_all(places.inertia, [0.0] * (places.pull - places.inertia))
-    block.store_all(places.pull, [*_tip_force(plan, block), *[0.0] * 9] * places.stages)
+    block.store_all(places.pull, [*_tip_force(plan, block), *[0.0] * 9])
     return block
 
 

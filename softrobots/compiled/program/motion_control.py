@@ -91,7 +91,7 @@ def control_text(plan: MotionPlan, bends: bool) -> str:
     elif plan.reduces:
         solve = "    reduce_all_SUFFIX(w)\n" + solve
     if plan.couples:
-        articulate = articulate.replace(_FACTOR, _either("    couple_all_SUFFIX(w)\n", _FACTOR))
+        articulate = _either("    start_couple_SUFFIX(w)\n    couple_all_SUFFIX(w)\n", articulate)
         solve = _either(solve.replace("_all", "_coupled_all"), solve)
     massive = _MASSIVE if plan.layout.full_damping else ""
     rub = "" if plan.guides is None else _DISPLACE + (_HOLD if held else "") + _RUB

@@ -14,7 +14,7 @@ from typing import NamedTuple
 
 from softrobots.compiled.translate.dialect import Dialect, Part
 from softrobots.compiled.translate.expressions import Scope
-from softrobots.compiled.translate.kernel_language import WORDS, Function, Module, Parameter, is_over_stages, read_module, walk
+from softrobots.compiled.translate.kernel_language import WORDS, Function, Module, Parameter, read_module, rounds_apart, walk
 from softrobots.compiled.translate.lines import INDENT, comment
 
 
@@ -178,7 +178,7 @@ class FunctionWriter:
             bound = f"stop_{self._bounds}"
             self._lines.append(f"{indent}{self._dialect.declaration('int', constant=True)}{bound} = {parts[-1].text};")
         self.scope.kinds[name] = "int"
-        if is_over_stages(node):
+        if rounds_apart(node):
             self._lines.extend(f"{indent}{line}" for line in self._dialect.rounds_apart.splitlines())
         self._lines.append(
             f"{indent}for ({self._dialect.declaration('int')}{name} = {start}; {name} < {bound}; {name} += 1) {{"

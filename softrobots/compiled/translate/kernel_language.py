@@ -135,12 +135,16 @@ def read_module(text: str) -> Module:
     return module
 
 
-def is_over_stages(node: ast.For) -> bool:
-    """Whether a loop goes over both stages of a step (`softrobots.compiled.trace.blocks`): no round reads what one writes."""
+def rounds_apart(node: ast.For) -> int:
+    """Return the number of rounds of a loop of which no round reads what another one writes; 0 of other loops.
+
+    Those are the loops of `softrobots.compiled.trace.blocks` over both stages of a step and over twelve components.
+    """
     match node:
-        case ast.For(target=ast.Name(id="stage"), iter=ast.Call(args=[ast.Constant(value=2)])):
-            return all(isinstance(one, ast.Assign) for one in node.body)
-    return False
+        case ast.For(target=ast.Name(id="stage" | "part" as name), iter=ast.Call(args=[ast.Constant(value=2 | 12)])):
+            if all(isinstance(one, ast.Assign) for one in node.body):
+                return 2 if name == "stage" else 12
+    return 0
 
 
 def _constant(module: Module, node: ast.expr) -> Number | tuple[Number, ...]:

@@ -1,8 +1,8 @@
 """The kernel language as text for LLVM: machine code without numba's search for types, which takes most of its time.
 
-Loops over both stages of a step (`softrobots.compiled.trace.blocks`) become straight-line code with pairs of numbers, on which
-the vector instructions of a processor work at once. LLVM itself vectorises few of them: it does not know that the places that a
-function reads and writes are different ones, and two rounds are too few to look.
+Loops over both stages of a step or twelve components (`softrobots.compiled.trace.blocks`) become straight-line code with pairs
+or rows of numbers, on which the vector instructions of a processor work at once. LLVM itself vectorises few of them: it does
+not know that the places that a function reads and writes are different ones, and two rounds are too few to look.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any
 
-from softrobots.compiled.translate.kernel_language import Function, is_over_stages, read_module, walk
+from softrobots.compiled.translate.kernel_language import Function, read_module, rounds_apart, walk
 from softrobots.compiled.translate.llvm_expressions import NAMES, PAIRED, ExpressionWriter, Symbols, Value, literal
 
 
@@ -105,10 +105,10 @@ class _FunctionWriter(ExpressionWriter):
                 self.jump(inside, end, self.value(test))
                 self._round(inside, body, head, end)
                 self.begin(end)
-            case ast.For(body=body) if is_over_stages(node):
-                self.values["stage"], self.in_pairs = literal(0), True
+            case ast.For(target=ast.Name(id=name), body=body) if count := rounds_apart(node):
+                self.values[name], self.apart = literal(0), (name, "pair" if count == 2 else "row")
                 self._block(body)
-                self.in_pairs = False
+                self.apart = "", ""
             case ast.For(target=ast.Name(id=name), iter=ast.Call(args=limits), body=body):
                 self._count_up(name, [literal(0), *map(self.value, limits)][-2:], body)
 

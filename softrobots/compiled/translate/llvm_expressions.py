@@ -22,8 +22,9 @@ TYPES: Mapping[str, ir.Type] = {
     "array": ir.DoubleType().as_pointer(),
     "pair": ir.VectorType(ir.DoubleType(), 2),
     "pair of bools": ir.VectorType(ir.IntType(1), 2),
+    "row": ir.VectorType(ir.DoubleType(), 12),
 }
-"""Types of LLVM by those of the kernel language, and of pairs."""
+"""Types of LLVM by those of the kernel language, of pairs and of rows."""
 
 NAMES = {kind: str(of) for kind, of in TYPES.items()}
 """Their names."""
@@ -45,7 +46,7 @@ _COMPARISONS: dict[type[ast.cmpop], tuple[str, str]] = {  # of ints, of floats
 
 
 class Value(NamedTuple):
-    """A number, a bool, or a pair of either."""
+    """A number, a bool, a pair of either, or a row of numbers."""
 
     text: str
     """Its name or literal."""
@@ -112,8 +113,8 @@ class ExpressionWriter:
         """Lines that stand before them."""
         self.values: dict[str, Value] = {}
         """Names that are assigned once."""
-        self.in_pairs = False
-        """Whether elements at both stages are pairs."""
+        self.apart = "", ""
+        """Variable of the loop whose rounds are done at once, and the type of the elements of all of them."""
         self._count = 0  # of names and labels
         self._places: dict[str, Value] = {}  # of names that are assigned more than once
         self._stored = stored
@@ -187,9 +188,10 @@ class ExpressionWriter:
             place = self.new(f"getelementptr inbounds {shape}, {pointer} {symbol}, i64 0, {index}", kind)
             return f"{POINTERS[kind]} {place.text}", kind
         place = self.new(f"getelementptr inbounds double, {self.values[name]}, {index}", "array")
-        if self.in_pairs and any(isinstance(one, ast.Name) and one.id == "stage" for one in walk(node.slice)):
-            place = self.new(f"bitcast {place} to {POINTERS['pair']}", "array")
-            return f"{POINTERS['pair']} {place.text}", "pair"
+        variable, kind = self.apart
+        if kind and any(isinstance(one, ast.Name) and one.id == variable for one in walk(node.slice)):
+            place = self.new(f"bitcast {place} to {POINTERS[kind]}", "array")
+            return f"{POINTERS[kind]} {place.text}", kind
         return str(place), "float"
 
     def _together(self, conditions: Sequence[ast.expr], are_all: bool) -> Value:
@@ -208,7 +210,7 @@ class ExpressionWriter:
         return self.new(f"phi i1 {', '.join(decided)}", "bool")
 
     def cast(self, kind: str, value: Value) -> Value:
-        """Return a value as one of another kind: an int as a float, a number as a pair of equal ones."""
+        """Return a value as one of another kind: an int as a float, a number as a pair or row of equal ones."""
         if value.kind == kind:
             return value
         if value.kind == "int":
@@ -216,11 +218,11 @@ class ExpressionWriter:
             value = literal(float(value.text)) if known else self.new(f"sitofp {value} to double", "float")
         if kind == "float":
             return value
-        single = self.new(f"insertelement {NAMES['pair']} undef, {value}, i32 0", "pair")
-        return self.new(f"shufflevector {single}, {NAMES['pair']} undef, <2 x i32> zeroinitializer", "pair")
+        single, count = self.new(f"insertelement {NAMES[kind]} undef, {value}, i32 0", kind), TYPES[kind].count
+        return self.new(f"shufflevector {single}, {NAMES[kind]} undef, <{count} x i32> zeroinitializer", kind)
 
     def _alike(self, *values: Value) -> tuple[list[Value], str]:
-        kind = "pair" if any(one.kind == "pair" for one in values) else "float"
+        kind = next((one.kind for one in values if one.kind in ("pair", "row")), "float")
         return [self.cast(kind, one) for one in values], kind
 
     def arithmetic(self, operation: ast.operator, one: Value, other: Value) -> Value:
