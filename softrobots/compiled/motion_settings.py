@@ -33,3 +33,6 @@ COASTING_ERROR = 0.01
 
 KEPT_DIFFERENCES = 8
 """Number of backward differences of the middles of equal steps from which the next middle is extrapolated."""
+
+LANE_CACHE = 262_144
+"""Workspace of all lanes together beyond which both stages of a step of one case are done faster than lanes [bytes]."""

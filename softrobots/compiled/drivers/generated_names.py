@@ -83,6 +83,7 @@ BEGIN_VELOCITY: int
 BEYOND: int
 CHANGE: int
 COASTS: int
+ALONE: int
 COUPLED: int
 DISPLACED: int
 FAILED: int

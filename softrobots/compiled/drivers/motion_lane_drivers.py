@@ -1,6 +1,7 @@
 """Steps of time of many cases side by side, in blocks of lanes; see `softrobots.compiled.drivers.lane_drivers`.
 
-A lane whose corrections do not converge is left behind, and its case is done alone from the beginning, with halved steps.
+A lane whose corrections do not converge is left behind, and its case is done alone from the beginning, with halved steps. So
+are all cases of a robot whose lanes do not fit in a cache (`ALONE`).
 """
 
 from __future__ import annotations
@@ -140,8 +141,12 @@ def motion_batch(
     `motors`, shape (n or 1, 2 n_steps + 1 or 1, N_MOTORS); `forces`, shape (n or 1, n_steps or 1, 3); `out`, shape
     (n, n_times, 2 N + 3).
     """
-    lanes = zeros(LANE_SIZE * LANES)
     case = zeros(WORKSPACE_SIZE)
+    if ALONE:
+        for one in range(first, last):
+            statuses[one] = move_alone(case, inputs, places, motors, forces, grid, times, out, one)
+        return
+    lanes = zeros(LANE_SIZE * LANES)
     for begin in range(first, last, LANES):
         for i in range(LANE_SIZE * LANES):
             lanes[i] = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
-from softrobots.compiled import motion_settings
+from softrobots.compiled import motion_settings, settings
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.drivers import motion_drivers, motion_lane_drivers, rubbing_motion_drivers
 from softrobots.compiled.drivers.lane_drivers import load_block, load_case, store_case
@@ -36,6 +36,7 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order
     if layout.coasting:
         values["STIFFNESS"] = tuple(plan.unknowns.chain.stiffness[list(plan.unknowns.strains)].tolist())
     values |= {"WORKSPACE_SIZE": parts.size, "LANE_SIZE": parts.size, "LANES": lane_count(parts.size)}
+    values["ALONE"] = int(plan.couples and 8 * parts.size * settings.MIN_LANES > motion_settings.LANE_CACHE)
     values |= {status.name: status.value for status in _STATUSES} | parts.constants
     functions = functions_of(motion_drivers)
     lane_functions: list[Callable[..., Any]] = [load_block, load_case, *functions_of(motion_lane_drivers)]
