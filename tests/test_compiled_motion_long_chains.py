@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib.util
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,7 +11,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.compiled import Status
+from softrobots.compiled import Status, motion_settings
 from softrobots.compiled.chain.unknowns import Unknowns
 from softrobots.compiled.motion.motion_groups import motion_groups
 from softrobots.compiled.program.motion_program import make_motion_program
@@ -24,6 +25,7 @@ from softrobots.dynamics.motion import MotionState
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
+from tests.conftest import missing
 from tests.support.c_libraries import Controller
 from tests.support.serial_chains import ROBOTS, pcc
 
@@ -308,3 +310,20 @@ def test_a_run_that_is_compared_ends_where_its_steps_have_too_many_parts(monkeyp
     for allowed, compared, status in ((parts, True, 0), (parts - 1.0, True, Status.UNSETTLED), (1.0, False, 0)):
         monkeypatch.setattr(motion_runs, "_PARTS_A_STEP", allowed / len(grid))
         assert take_one(run, state, given, course, grid, grid, compared=compared).status[0] == status
+
+
+def test_cases_that_are_done_one_by_one_are_those_of_lanes(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where the workspaces of all lanes together are too large, as for long rods; both solve a step to 1e-13."""
+    if importlib.util.find_spec("numba") is None:
+        missing("numba is not installed")
+    model, start = aside(3, 0.15)
+    starts = start.q_springs * np.linspace(0.5, 1.0, 3)[:, None]
+    found = []
+    for memory in (0, 1 << 30):
+        monkeypatch.setattr(motion_settings, "LANE_CACHE", memory)
+        solver = sr.compile(model, backend="numba")
+        assert f"ALONE = {int(memory == 0)}\n" in solver._motion_code(None, 0.0, 0.0, 4)[0].program.text
+        batch = solver.simulations(0.05, np.zeros((3, 0)), starts=starts, damping_time=0.0, time_step=2.5e-3, order=4)
+        assert not np.any(batch.status)
+        found.append(batch.q_springs)
+    np.testing.assert_allclose(*found, rtol=0, atol=1e-9 * np.abs(starts).max())
