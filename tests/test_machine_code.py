@@ -15,7 +15,7 @@ from softrobots.compiled.run.backends import numba_module
 from tests.conftest import missing
 from tests.support.kernel_texts import EVERYTHING, EXPORTED, PYTHON, TRIGONOMETRY, in_python
 
-STAGES = f'''"""Functions with loops over both stages of a step."""
+STAGES = f'''"""Functions with loops over both stages of a step, and over twelve components."""
 
 TABLE = (0.25, -3.0)
 
@@ -38,6 +38,15 @@ def each(w: Array, x: float) -> None:
     """Call it."""
     both(w, 1, x)
     both(w, 2, -x)
+
+
+def rows(w: Array, at: int, x: float) -> None:
+    """Sums of rows, with what they have in common."""
+    y = w[at]
+    for part in range(12):
+        a = w[at + part] * x - y / (3 + w[26 + part])
+        w[at + part] = a - at
+        w[14 + part] = -a
 '''
 
 
@@ -83,10 +92,11 @@ def test_operators_intrinsics_and_constants(everything: Any, rng: np.random.Gene
 
 
 def test_both_stages_at_once(in_machine_code: Callable[[str, list[str]], Any], rng: np.random.Generator) -> None:
-    """Pairs of numbers are what the loop gives: no round reads what the other one writes."""
-    module, names = in_machine_code(STAGES, ["each"]), in_python(STAGES)
+    """Pairs of numbers, and rows, are what the loop gives: no round reads what another one writes."""
+    module, names = in_machine_code(STAGES, ["each", "rows"]), in_python(STAGES)
     for x in rng.uniform(-2.0, 2.0, 20):
         assert_alike(module, names, "each", rng.uniform(-2.0, 2.0, 14).tolist(), float(x))
+        assert_alike(module, names, "rows", rng.uniform(-2.0, 2.0, 38).tolist(), 2, float(x))
 
 
 def test_arrays_that_are_not_flat_are_refused(everything: Any) -> None:
