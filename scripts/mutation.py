@@ -66,7 +66,7 @@ PARTS = {
         tuple(f"constant_curvature/{name}.py" for name in ("stumpff", "screws", "strain_chain")), ("strain_chain", "laws_other")
     ),
     "inflated_beam": Part(
-        tuple(f"inflated_beam/{name}.py" for name in ("beam", "bending_test", "characterisation", "inflation")),
+        tuple(f"inflated_beam/{name}.py" for name in ("beam", "bending_test", "characterisation")),
         ("inflated_beam", "laws_inflated_beam", "characterisation_fit", "argument_errors", "hostile_numbers"),
     ),
     "constant_curvature": Part(

@@ -144,8 +144,8 @@ def test_models_solutions_and_movements_are_drawn() -> None:
         sr.plot(3)  # type: ignore[arg-type]
 
 
-UNDRAWN = {"characterisation", "linear_model", "measurements", "motion_batch"}
-"""Kinds of results that have no figure of their own: that of a characterisation needs its data."""
+UNDRAWN = {"characterisation", "helix_design", "linear_model", "measurements", "motion_batch"}
+"""Kinds of results that have no figure of their own: that of a characterisation needs its data, that of a design a tube."""
 
 
 @pytest.mark.study

@@ -31,6 +31,7 @@ _XACRO_LOCK = threading.Lock()  # xacro keeps its arguments and macros in module
 _EXPRESSION = re.compile(r"\$\{([^}$]*)\}")
 _WORD = re.compile("[$(/#a-eghj-mo-su-zA-EGHJ-MO-SU-Z]")  # what begins with these is no number and no truth value
 _once = lru_cache(maxsize=2048)(lambda function, text: function(text))  # xacro parses what it meets again and again
+_compiled = lru_cache(maxsize=2048)(compile)  # and compiles every expression when it meets it
 
 
 def declared_arguments(xacro_file: str | Path) -> dict[str, str | None]:
@@ -139,7 +140,10 @@ def _checked_files() -> Iterator[None]:
     import xacro
 
     names = ("parse", "eval_all", "resolve_macro", "replace_node", "eval_text", "is_valid_name", "Table")
-    own, steps = {name: getattr(xacro, name) for name in names}, 0
+    own: dict[str, Any] = {name: getattr(xacro, name) for name in names} | {
+        "compile": compile
+    }  # Python's, behind xacro's names
+    steps = 0
 
     def count(more: int) -> None:
         nonlocal steps
@@ -170,17 +174,14 @@ def _checked_files() -> Iterator[None]:
     def text_of(text: Any, symbols: Any) -> Any:
         if isinstance(text, str) and "$" not in text:
             return text
-        between, codes = _once(_pieces, text)
-        if not codes:
+        parts = _once(_pieces, text)
+        if not parts:
             return own["eval_text"](text, symbols)
-        symbols.update(__builtins__={})
-        found = between[:1]
-        for code, after in zip(codes, between[1:], strict=True):
-            try:
-                found += eval(code, symbols), after
-            except Exception as error:
-                raise xacro.XacroException(exc=error, suffix=f"\nwhen evaluating an expression of {text!r}") from error
-        return found[1] if len(codes) == 1 and between == ["", ""] else "".join(map(str, found))
+        try:
+            found = [xacro.safe_eval(part, symbols) if place % 2 else part for place, part in enumerate(parts)]
+        except Exception as error:
+            raise xacro.XacroException(exc=error, suffix=f"\nwhen evaluating an expression of {text!r}") from error
+        return found[1] if len(parts) == 3 and parts[0] == parts[2] == "" else "".join(map(str, found))
 
     class Table(xacro.Table):  # type: ignore[misc]
         """Names without recursion, texts without exceptions."""
@@ -196,23 +197,18 @@ def _checked_files() -> Iterator[None]:
             return value if isinstance(value, str) and _WORD.match(value) else xacro_table._eval_literal(value)
 
     xacro_table: Any = own["Table"]
-    ours = {"parse": checked, "eval_all": evaluated, "resolve_macro": resolved, "replace_node": replace_node}
-    vars(xacro).update(ours, eval_text=text_of, is_valid_name=partial(_once, own["is_valid_name"]), Table=Table)
+    ours = {"parse": checked, "eval_all": evaluated, "resolve_macro": resolved, "replace_node": replace_node, "Table": Table}
+    vars(xacro).update(ours, eval_text=text_of, is_valid_name=partial(_once, own["is_valid_name"]), compile=_compiled)
     try:
         yield
     finally:
         vars(xacro).update(own)
 
 
-def _pieces(text: str) -> tuple[list[str], list[Any]]:
-    """Return what stands between the expressions of a text, and their code; no code where xacro must read it itself."""
+def _pieces(text: str) -> list[str]:
+    """Return a text cut at its expressions, which are every other part; nothing where xacro must read it itself."""
     parts = _EXPRESSION.split(text)
-    try:
-        codes = [compile(part.strip(), "<expression>", "eval") for part in parts[1::2]]
-    except (SyntaxError, ValueError):
-        codes = []
-    left = "$" in "".join(parts[::2]) or any(name[:2] == "__" for code in codes for name in code.co_names)
-    return parts[::2], [] if left else codes
+    return [] if "$" in "".join(parts[::2]) else parts
 
 
 @contextmanager
