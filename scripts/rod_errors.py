@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import argparse
 import dataclasses
+import math
 import sys
 import time
 from typing import Any
@@ -19,7 +20,7 @@ import numpy as np
 
 import softrobots as sr
 from softrobots.cli.options.command_line import exit_status
-from softrobots.core.checks import positive_integer, positive_number
+from softrobots.core.checks import finite_number, positive_integer, positive_number
 
 FORMS = ("lumped", "flexures", "sections")
 """Chains that are compared."""
@@ -38,6 +39,8 @@ def parser() -> argparse.ArgumentParser:
     help_text = "steps of this length [s] (chosen by the error)"
     result.add_argument("--time-step", type=float, metavar="H", help=help_text)
     result.add_argument("--order", type=int, choices=(2, 4), default=2, help="of steps of a given length (%(default)d)")
+    help_text = "of the pull to a plane of the hinges; the reference has no such planes [rad] (%(default)g)"
+    result.add_argument("--angle", type=float, default=0.0, metavar="A", help=help_text)
     return result
 
 
@@ -48,7 +51,9 @@ def reference(rod: Any, force: float, duration: float) -> np.ndarray:
     return np.asarray(rod.tips(rod.equilibrium((force, 0.0)), duration, round(duration / ROW), int(np.ceil(ROW / step))))
 
 
-def off(rod: Any, form: str, count: int, force: float, path: np.ndarray, steps: dict[str, Any]) -> tuple[float, float]:
+def off(
+    rod: Any, form: str, count: int, force: float, path: np.ndarray, steps: dict[str, Any], angle: float = 0.0
+) -> tuple[float, float]:
     """Mean distance of the tip of one of our chains from a path [m], and seconds of the processor for a second of motion."""
     model = sr.load_model(
         sr.PccArm(
@@ -58,7 +63,8 @@ def off(rod: Any, form: str, count: int, force: float, path: np.ndarray, steps: 
         )
     )  # fmt: skip
     gravity, duration, solver = (0.0, rod.gravity[0], rod.gravity[1]), ROW * (len(path) - 1), sr.compile(model)
-    start = sr.solve_equilibrium(model, (), force=(force, 0.0, 0.0), gravity=gravity)
+    aside = np.array([math.cos(angle), math.sin(angle), 0.0])
+    start = sr.solve_equilibrium(model, (), force=force * aside, gravity=gravity)
     options: dict[str, Any] = {
         "start": start, "gravity": gravity, "damping_time": rod.retardation, "output_step": ROW, **steps,
     }  # fmt: skip
@@ -68,7 +74,8 @@ def off(rod: Any, form: str, count: int, force: float, path: np.ndarray, steps: 
         began = time.process_time()
         moved = solver.simulate(duration, (), **options)
         taken = min(taken, time.process_time() - began)
-    return float(np.linalg.norm(moved.tip_position[:, [0, 2]] - path, axis=1).mean()), taken / duration
+    tips = np.outer(path[:, 0], aside) + np.outer(path[:, 1], (0.0, 0.0, 1.0))
+    return float(np.linalg.norm(moved.tip_position - tips, axis=1).mean()), taken / duration
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -79,12 +86,13 @@ def main(argv: list[str] | None = None) -> int:
         steps: dict[str, Any] = {}
         if args.time_step is not None:
             steps = {"time_step": positive_number("time_step", args.time_step, "s"), "order": args.order}
-        _table(positive_integer("count", args.count), positive_number("duration", args.duration, "s"), steps)
+        count, duration = positive_integer("count", args.count), positive_number("duration", args.duration, "s")
+        _table(count, duration, steps, finite_number("angle", args.angle, "rad"))
 
     return exit_status(run)
 
 
-def _table(count: int, duration: float, steps: dict[str, Any]) -> None:
+def _table(count: int, duration: float, steps: dict[str, Any], angle: float) -> None:
     from tests.support.planar_rod import PlanarRod
 
     steel = PlanarRod(0.6, 0.8e-3, 200e9, 7850.0, gravity=(0.0, -9.81))
@@ -97,7 +105,7 @@ def _table(count: int, duration: float, steps: dict[str, Any]) -> None:
             path, aside = reference(fine, force, duration), fine.tip(fine.equilibrium((force, 0.0)))[0]
             coarse = reference(dataclasses.replace(fine, bends=bends - 1), force, duration)
             damped = dataclasses.replace(rod, retardation=damping)
-            found = {form: off(damped, form, count, force, path, steps) for form in FORMS}
+            found = {form: off(damped, form, count, force, path, steps, angle) for form in FORMS}
             cells = [f"{1e3 * error:.2g} mm" for error, _ in found.values()]
             cells.append(f"{1e3 * np.linalg.norm(path - coarse, axis=1).mean():.1g} mm")
             words = f"{1e3 * damping:g} ms" if damping else "none"
