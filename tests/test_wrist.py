@@ -173,6 +173,14 @@ def test_poses_of_random_motors_are_reached_under_load_all(wristed: sr.SoftModel
     check_reached(sr.load_model(sr.InflatableArm(link_lengths=(0.5, 0.4, 0.3), wrist=(0.0, 0.1))), cases // 12, 12)
 
 
+def test_a_pose_behind_a_folded_elbow_is_reached(wristed: sr.SoftModel) -> None:
+    """Where the elbow nearly folds, the way to the pose is a bent valley, along which too much damping creeps."""
+    motors, load, pose = list(poses(wristed, 116, 11))[-1]
+    found = sr.solve_ik(wristed, pose, **load)
+    assert found.q_motors == pytest.approx(motors, abs=1e-6)
+    assert max(apart(found.equilibrium.transform_tip_to_world, pose)) < 1e-9
+
+
 def closed_form(pose: pin.SE3, upper: float, fore: float, hand: float) -> list[np.ndarray]:
     """The eight or fewer solutions of a rigid arm with this wrist: cosine rule for the arm, then angles from the matrix."""
     rotation = pose.rotation

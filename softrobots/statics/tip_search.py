@@ -197,8 +197,7 @@ def search(
         step = towards + pace * drift
         step *= min(1.0, _LARGEST_STEP / max(float(np.linalg.norm(step)), 1e-300))
         moved = model.actuators.go(here.q_motors, basis @ step)
-        guess = here.state.q_springs + shift + follow @ (moved - here.q_motors)
-        there = tip.solve(moved, guess)
+        there = tip.solve(moved, here.state.q_springs + shift + follow @ (moved - here.q_motors))
         unsolved += there is None
         if rubs and not arrived and there is not None and there.miss(model) >= miss:  # the way of the tip is bent
             aside = near._replace(missing=tip.missing(there.state)).step(basis, max(mu, _LAST_DAMPING * model.reach))
@@ -219,10 +218,11 @@ def search(
             nearer = float(np.linalg.norm(slope @ towards))
             if nearer <= max(_NO_NEARER * float(np.linalg.norm(missing)), 0.01 * tolerance):
                 break
-            mu = max((3.0 if rubs else 10.0) * mu, nearer / float(np.linalg.norm(step)))  # half as far, at most
-            refused, ease = (0, 1.0) if rubs else (refused, ease)
-    ended = here if reached is None or here.arrived(tolerance) else reached
-    return replace(ended, iterations=iteration, unsolved=unsolved)
+            if rubs:  # half as far, at most
+                mu, refused, ease = max(3.0 * mu, nearer / float(np.linalg.norm(step))), 0, 1.0
+            else:  # damping far below the least singular value (norm -2) shortens no step, far above it creeps
+                mu, ease = max(3.0 * mu, 0.3 * float(np.linalg.norm(slope, -2)), _LAST_DAMPING * model.reach), 0.3
+    return replace(here if reached is None or here.arrived(tolerance) else reached, iterations=iteration, unsolved=unsolved)
 
 
 def advance(
