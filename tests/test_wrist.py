@@ -175,7 +175,7 @@ def test_poses_of_random_motors_are_reached_under_load_all(wristed: sr.SoftModel
 
 def test_a_pose_behind_a_folded_elbow_is_reached(wristed: sr.SoftModel) -> None:
     """Where the elbow nearly folds, the way to the pose is a bent valley, along which too much damping creeps."""
-    motors, load, pose = list(poses(wristed, 116, 11))[-1]
+    motors, load, pose = poses(wristed, 116, 11)[-1]
     found = sr.solve_ik(wristed, pose, **load)
     assert found.q_motors == pytest.approx(motors, abs=1e-6)
     assert max(apart(found.equilibrium.transform_tip_to_world, pose)) < 1e-9

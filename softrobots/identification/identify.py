@@ -113,9 +113,9 @@ def identify(
     with one_blas_thread(1000):
         predictor = Predictor(chosen, rows)
         few = Predictor(chosen, rows[::every]) if every > 1 and _sees_all(rows, counted, every) else predictor
-        told = counted if few is predictor else counted[::every]
-        values[0] = mounted(few, values[0], told)
-        weights = Weights.of(few.measurements.std, few.at(values[0]).differences(), told)
+        counted_few = counted if few is predictor else counted[::every]
+        values[0] = mounted(few, values[0], counted_few)
+        weights = Weights.of(few.measurements.std, few.at(values[0]).differences(), counted_few)
         if not len(weights.rows()):
             raise ParameterError("measurements", measurements, "with at least one number in a row that counts")
         robust = loss if weights.known else "linear"
