@@ -76,7 +76,7 @@ from softrobots.statics.trajectory import Trajectory, follow_trajectory
 from softrobots.statics.workspace import Workspace, sample_workspace
 from softrobots.version import __version__
 from softrobots.view.figures.picture import plot
-from softrobots.view.interactive_page import interactive, write_interactive
+from softrobots.view.interactive_page import interactive
 from softrobots.view.viewer import Viewer, view
 
 if TYPE_CHECKING:
@@ -197,7 +197,6 @@ __all__ = [
     "waypoints",
     "with_points",
     "with_springs",
-    "write_interactive",
 ]
 
 

@@ -50,7 +50,6 @@ WITHOUT = {
     "view.served_page.ServedPage": "its methods have laws, under the name of Viewer",
     "view.slider_page.SliderPage": "a page in a browser: test_slider_page moves its sliders",
     "interactive": "a page in a browser: test_interactive_page compares what it solves and draws",
-    "write_interactive": "as interactive",
     "view.figures.*": "pictures: tests look at what is drawn, and hypothesis has no eyes",
     "cli.main.main": "hypothesis tries words for each command in test_cli_bad_words, within a test for each",
     "cli.main.parser": _SCREEN,

@@ -45,7 +45,7 @@ export follow_contact follow_trajectory grown_coordinates helix identify inflate
 interactive is_force_closure linearize load_model load_result locate_contact mount plot post_buckling_branches
 pull_out_force quintic read_waypoints residual_vibration ring_down sample_workspace save_csv save_result sensitivity
 shape_input simulate solve_equilibrium solve_ik solve_imposed_displacement straight_line to_dataframe vibration_modes view
-waypoints with_points with_springs write_interactive
+waypoints with_points with_springs
 """
 """What users import from `softrobots`: a name is added here on purpose, and none disappears unnoticed."""
 

@@ -149,7 +149,6 @@ PAGES = {
             *_top(
                 "view",
                 "Viewer",
-                "write_interactive",
                 "interactive",
                 "view.written_page.WrittenPage",
                 "view.served_page.ServedPage",

@@ -165,22 +165,16 @@ def _slide(arguments: argparse.Namespace, equilibrium: Equilibrium) -> None:
 
 def _write_interactive(arguments: argparse.Namespace, equilibrium: Equilibrium) -> None:
     """Write the page that solves by itself, with an equilibrium as its first pose."""
-    from softrobots.view.interactive_page import write_interactive
+    from softrobots.view.interactive_page import interactive
 
     load = equilibrium.load
     if load.environment is not None:
         raise ParameterError(
             "--environment", str(arguments.environment), "left out with --interactive: its page has no obstacles"
         )
-    page = write_interactive(
-        equilibrium.model,
-        arguments.interactive,
-        q_motors=equilibrium.q_motors,
-        force=tip_force(equilibrium),
-        gravity=load.gravity,
-        overwrite=arguments.overwrite,
-    )
-    print_answer(arguments, {"files": [page]}, [state_line(equilibrium), f"{page}: written"])
+    page = interactive(equilibrium.model, q_motors=equilibrium.q_motors, force=tip_force(equilibrium), gravity=load.gravity)
+    file = page.write_html(arguments.interactive, overwrite=arguments.overwrite)
+    print_answer(arguments, {"files": [file]}, [state_line(equilibrium), f"{file}: written"])
 
 
 def _show(arguments: argparse.Namespace, viewer: Viewer, model: SoftModel, state: str) -> None:

@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import finite_array, positive_integer
-from softrobots.core.files import new_file, write_text
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.view.appearance import LINE_COLOUR, RIGID_COLOUR, TUBE_COLOUR
@@ -20,47 +18,6 @@ from softrobots.view.scene import WRINKLING_COLOURS
 from softrobots.view.slider_ranges import visible_force
 
 
-def write_interactive(
-    model: SoftModel,
-    path: str | Path,
-    *,
-    title: str | None = None,
-    q_motors: Any = None,
-    force: Any = None,
-    gravity: Any = None,
-    overwrite: bool = False,
-) -> Path:
-    """Write a page that solves the statics of a robot by itself, in any browser: one HTML file that requests nothing.
-
-    Sliders move motors or muscles, the force on the tip and gravity; the tip can be dragged. The solver in the page is that of
-    `softrobots.compile`: each pose is in balance and certified stable. `window.softrobots.solve({motors, force, gravity})` in
-    the page returns tip, springs and status. With dry friction a change is a way in small steps from what is shown, and a tip
-    that is dragged moves no motors.
-
-    Args:
-        model: A robot that `softrobots.compile` takes.
-        path: The file.
-        title: Title of the page; the name of the robot by default.
-        q_motors: Actuator coordinates that are shown first, shape (n_motors,) [rad, m, N or Pa], or a mapping by name; relaxed
-            by default.
-        force: Force on the tip that is shown first, shape (3,) [N], world axes; none by default.
-        gravity: Gravity that is shown first, shape (3,) [m/s^2], world axes; None: weightless.
-        overwrite: Replace an existing file.
-
-    Returns:
-        The path.
-
-    Raises:
-        ParameterError: If an argument has the wrong shape, is not finite or out of range.
-        DescriptionError: If the robot is not a serial chain with linear springs.
-        EquilibriumNotFound: If there is no equilibrium at the start.
-        OutputExists: If the file exists and `overwrite` is false.
-        ViewerError: If a shape cannot be drawn.
-    """
-    new_file(path, overwrite=overwrite)  # refused before the work
-    return write_text(path, _page(model, title, q_motors, force, gravity), overwrite=overwrite)
-
-
 def interactive(
     model: SoftModel,
     *,
@@ -70,14 +27,21 @@ def interactive(
     gravity: Any = None,
     height: int = 560,
 ) -> InlinePage:
-    """Return the page of `write_interactive` for a cell of a notebook, which needs no server and no extension.
+    """Return a page that solves the statics of a robot by itself, in any browser: HTML that requests nothing.
+
+    A cell of a notebook shows it, without server or extension; `write_html` of the result writes it into a file. Sliders move
+    motors or muscles, the force on the tip and gravity; the tip can be dragged. The solver in the page is that of
+    `softrobots.compile`: each pose is in balance and certified stable. `window.softrobots.solve({motors, force, gravity})` in
+    the page returns tip, springs and status. With dry friction a change is a way in small steps from what is shown, and a tip
+    that is dragged moves no motors.
 
     Args:
         model: A robot that `softrobots.compile` takes.
-        title: As in `write_interactive`.
-        q_motors: As there.
-        force: As there.
-        gravity: As there.
+        title: Title of the page; the name of the robot by default.
+        q_motors: Actuator coordinates that are shown first, shape (n_motors,) [rad, m, N or Pa], or a mapping by name; relaxed
+            by default.
+        force: Force on the tip that is shown first, shape (3,) [N], world axes; none by default.
+        gravity: Gravity that is shown first, shape (3,) [m/s^2], world axes; None: weightless.
         height: Height in the notebook [px].
 
     Raises:
@@ -86,11 +50,6 @@ def interactive(
         EquilibriumNotFound: If there is no equilibrium at the start.
         ViewerError: If a shape cannot be drawn.
     """
-    return InlinePage(_page(model, title, q_motors, force, gravity), positive_integer("height", height, 10_000))
-
-
-def _page(model: SoftModel, title: str | None, q_motors: Any, force: Any, gravity: Any) -> str:
-    """The text of the page."""
     from softrobots.compiled.run.compiled_model import compile_model
 
     motors = check_model(model).checked_motors(model.relaxed_motors if q_motors is None else q_motors)
@@ -101,8 +60,9 @@ def _page(model: SoftModel, title: str | None, q_motors: Any, force: Any, gravit
     largest = max(visible_force(model), float(np.abs(push).max()))
     data = robot_data(solve_equilibrium(model, model.relaxed_motors), largest)
     data["start"] = {"motors": motors.tolist(), "force": push.tolist(), "gravity": weight}
-    kinds = _kinds(model)
-    return interactive_text(data, solver, title or str(model.pinocchio.name).replace("_", " "), kinds, _legend(model, data))
+    name = title or str(model.pinocchio.name).replace("_", " ")
+    text = interactive_text(data, solver, name, _kinds(model), _legend(model, data))
+    return InlinePage(text, positive_integer("height", height, 10_000))
 
 
 def _kinds(model: SoftModel) -> str:

@@ -8,7 +8,7 @@ from typing import Any, NamedTuple
 from softrobots.model.loader import load_model
 from softrobots.robots import HelixTube, InflatableArm, PccArm, TendonArm
 from softrobots.statics.loads import EARTH_GRAVITY
-from softrobots.view.interactive_page import write_interactive
+from softrobots.view.interactive_page import interactive
 
 
 class LivePage(NamedTuple):
@@ -19,11 +19,11 @@ class LivePage(NamedTuple):
     title: str
     """Title of the page."""
     start: dict[str, Any]
-    """What it shows first, as arguments of `write_interactive`."""
+    """What it shows first, as arguments of `interactive`."""
 
     def write(self, file: Path) -> Path:
         """Write the page, in place of an older one."""
-        return write_interactive(load_model(self.robot), file, title=self.title, overwrite=True, **self.start)
+        return interactive(load_model(self.robot), title=self.title, **self.start).write_html(file, overwrite=True)
 
 
 LIVE_PAGES = {

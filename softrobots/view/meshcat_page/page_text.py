@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from string import Template
 
+from softrobots.core.files import write_text
 from softrobots.version import __version__
 from softrobots.view.appearance import Colour, rgb
 from softrobots.view.legend import LegendEntry
@@ -28,6 +29,15 @@ class InlinePage:
     """HTML text of the page."""
     height: int = 480
     """Height in the notebook [px]; it is as wide as the cell."""
+
+    def write_html(self, path: str | Path, *, overwrite: bool = False) -> Path:
+        """Write the page to a file, and return its path.
+
+        Raises:
+            OutputExists: If the file exists and `overwrite` is false.
+            OutputError: If it cannot be written; then nothing is changed.
+        """
+        return write_text(path, self.page, overwrite=overwrite)
 
     def _repr_html_(self) -> str:
         """Return the iframe for Jupyter."""
