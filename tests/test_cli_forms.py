@@ -336,16 +336,12 @@ def test_helix_design_of_a_grasp_and_the_nearest_that_can_be_made(answer, told) 
     assert found["turn_height_deviation"] == pytest.approx(found["turn_height"] - 0.01, abs=1e-12)
 
 
-def test_helix_limits_are_those_of_theory(answer, told) -> None:
-    angles = words_of(np.radians((2.5, 5.0, 10.0)))
-    found = answer("helix", "limit", "--angle", *angles)
-    assert np.allclose(found["contraction_limit"], (0.4882, 0.3739, 0.2689), rtol=0.0, atol=5.1e-5)
-    assert np.allclose(found["simple_contraction_limit"], (0.4871, 0.3719, 0.2658), rtol=0.0, atol=5.1e-5)
-    for angle, limit in zip(angles, found["contraction_limit"], strict=True):  # contact on one side, none on the other
-        sides = [answer("helix", "forward", "--angle", angle, "--contraction", repr(limit + off)) for off in (1e-6, -1e-6)]
+def test_helix_tells_the_contraction_at_which_it_touches_itself(answer) -> None:
+    for angle, limit in zip(words_of(np.radians((2.5, 5.0, 10.0))), (0.4882, 0.3739, 0.2689), strict=True):
+        exact = answer("helix", "forward", "--angle", angle)["contraction_limit"]
+        assert exact == pytest.approx(limit, abs=5.1e-5)
+        sides = [answer("helix", "forward", "--angle", angle, "--contraction", repr(exact + off)) for off in (1e-6, -1e-6)]
         assert [side["touches"] for side in sides] == [False, True]
-    row = told("helix", "limit", "--angle", angles[0])[1].splitlines()[1].split()
-    assert [float(word) for word in row] == pytest.approx((math.radians(2.5), 0.4882, 0.4871), abs=5.1e-5)
 
 
 @each_row(
@@ -370,7 +366,6 @@ def test_helix_limits_are_those_of_theory(answer, told) -> None:
         (["design", "--antenna", "0.07", "0.18", "3", "--squeeze", "0.001"], "--squeeze must be left out without --grasp"),
         (["design", "--grasp", "0.02", "0.08", "1", "--squeeze", "0.03"], "less than the radius of the object"),
         (["design", "--antenna", "0.07", "0.18", "3", "--template", "a.svg", "--spacing", "0"], "spacing"),
-        (["limit", "--angle", "2"], "angle"),
     ],
 )
 def test_helix_refuses(words: list[str], message: str, told, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -389,7 +384,6 @@ def test_helix_refuses(words: list[str], message: str, told, tmp_path: Path, mon
         ["helix", "forward"],
         ["helix", "forward", "--contraction", "1"],  # a straight tube has no neighbouring turns
         ["helix", "design", "--antenna", "0.07", "0.18", "3"],
-        ["helix", "limit"],
     ],
 )
 def test_every_number_in_json_has_a_unit(words: list[str], answer) -> None:

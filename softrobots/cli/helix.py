@@ -15,7 +15,6 @@ from softrobots.cli.reports.answers import Fact, add_json, answer_of, lines_of, 
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.core.files import new_file
 from softrobots.core.result_file import save_result
-from softrobots.core.summary import aligned
 from softrobots.helix.template import write_template
 from softrobots.robots import HelixTube
 
@@ -24,7 +23,6 @@ _EXAMPLES = """examples:
   softrobots helix inverse --outer-radius 0.0854 --inner-radius 0.0523 --pitch 0.02796
   softrobots helix measure --outer-arc 0.5647 --inner-arc 0.3727   arcs of one turn -> helix, actuator
   softrobots helix design --antenna 0.07 0.18 3 --template antenna.svg -o antenna.json
-  softrobots helix limit --angle 0.0436 0.0873 0.1745              smallest contraction without self-contact
 
 All lengths in m, all angles in rad (5 degrees are 0.0873 rad). Defaults are those of the robot helix_tube.
 `softrobots solve helix_tube` knows its weight and loads; scripts/helix_tube.py makes all files of a tube at once.
@@ -39,7 +37,7 @@ def add_parser(subparsers: Any) -> None:
     """Add the subcommand."""
     parser = subparsers.add_parser(
         "helix",
-        help="helical actuation of a tube in closed form: shape, inverse, measurement, design, limit",
+        help="helical actuation of a tube in closed form: shape, inverse, measurement, design",
         description="An inflated tube that an actuator around it bends into a helix, in closed form.",
         epilog=_EXAMPLES,
     )
@@ -88,22 +86,9 @@ def add_parser(subparsers: Any) -> None:
     help_text = "how the actuator is fabricated (%(default)s)"
     design.add_argument("--method", choices=helix.METHODS, default=helix.METHODS[0], help=help_text)
 
-    limit = forms.add_parser(
-        "limit",
-        help="smallest contraction without self-contact",
-        description="The smallest contraction of an actuator at which an endless tube does not run into itself: exact, and by "
-        "the rule that a turn rises by a diameter. It does not depend on the diameter.",
-        epilog=_JSON,
-    )
-    help_text = f"angle of the actuator to the axis of the tube, one or more, in [0, pi/2) [rad] ({HelixTube.angle:.6g})"
-    add_numbers(limit, "--angle", "A", help_text, nargs="+", default=[HelixTube.angle])
-    _add_diameter(limit)
-    add_json(limit)
-    limit.set_defaults(run=_limit)
-
 
 def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summary: str) -> argparse.ArgumentParser:
-    """Add a form that ends in a helix, with the options that all of them have."""
+    """Add a form, with the options that all of them have."""
     parser: argparse.ArgumentParser = forms.add_parser(
         name, help=summary, description=f"Helical actuation in closed form: {summary}.", epilog=_JSON
     )
@@ -197,20 +182,6 @@ def _designed(arguments: argparse.Namespace) -> helix.HelixDesign:
     except SelfIntersection as error:
         message = f"{error.contact}; --nearest takes the nearest helix that does not touch itself"
         raise SelfIntersection(message, contact=error.contact) from error
-
-
-def _limit(arguments: argparse.Namespace) -> None:
-    """Angles to the limits of contraction."""
-    exact = helix.contraction_limit(arguments.angle, arguments.diameter)
-    simple = helix.simple_contraction_limit(arguments.angle)
-    facts = [
-        Fact("angle", arguments.angle, "rad", "angle of the actuator"),
-        Fact("contraction_limit", exact, "-", "smallest contraction, exact"),
-        Fact("simple_contraction_limit", simple, "-", "by the simple rule"),
-    ]
-    rows = [("angle [rad]", "smallest contraction [-]", "by the simple rule [-]")]
-    rows += [tuple(f"{number:.6f}" for number in row) for row in zip(arguments.angle, exact, simple, strict=True)]  # type: ignore[misc]
-    print_answer(arguments, answer_of(facts), aligned(rows))
 
 
 def _tube_facts(arguments: argparse.Namespace, shape: helix.HelixShape, actuator: helix.Actuator, length: float) -> list[Fact]:
