@@ -322,7 +322,6 @@ DEFAULTS = [
     ("curvature_torsion", "handedness", "right"),
     ("actuator_curvature_torsion", "path", "centre"),
     ("actuator_curvature_torsion", "handedness", "right"),
-    ("check_self_contact", "on_contact", "error"),
 ]
 
 

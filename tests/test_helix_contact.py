@@ -6,7 +6,6 @@ import cmath
 import math
 import pickle
 import re
-import warnings
 from pathlib import Path
 from typing import Any
 
@@ -418,28 +417,6 @@ def test_contact_is_an_error_that_carries_the_finding() -> None:
     assert again.contact.touches.tolist() == [True, False]
 
 
-def test_contact_is_a_warning_that_carries_the_finding_where_asked_for() -> None:
-    shape = helix.forward(0.3, math.radians(5.0), DIAMETER)
-    with pytest.warns(helix.SelfContactWarning, match="runs into itself") as caught:
-        found = helix.check_self_contact(shape, on_contact="warn")
-    assert caught[0].message.contact is found  # type: ignore[union-attr]
-    assert found.touches
-
-
-def test_a_warning_points_at_the_caller() -> None:
-    with pytest.warns(helix.SelfContactWarning) as caught:
-        helix.check_self_contact(helix.forward(0.3, math.radians(5.0), DIAMETER), on_contact="warn")
-    assert caught[0].filename == __file__
-
-
-@each_row(("contraction", "on_contact"), [(0.3, "ignore"), (0.9, "warn"), (0.9, "error"), (0.9, "ignore")])
-def test_nothing_is_said_without_contact_or_where_asked_not_to(contraction: float, on_contact: str) -> None:
-    with warnings.catch_warnings():
-        warnings.simplefilter("error")
-        found = helix.check_self_contact(helix.forward(contraction, math.radians(5.0), DIAMETER), on_contact=on_contact)
-    assert bool(found.touches) == (contraction == 0.3)
-
-
 def test_a_short_tube_passes_the_check_that_an_endless_one_fails() -> None:
     shape = helix.forward(0.3, math.radians(5.0), DIAMETER)
     assert not helix.check_self_contact(shape, 0.6).touches
@@ -470,12 +447,6 @@ def test_shapes_that_do_not_broadcast_are_refused() -> None:
         helix.self_contact(helix.forward([0.5, 0.6], 0.1, DIAMETER), [1.0, 2.0, 3.0])
     with pytest.raises(ParameterError, match="broadcast"):
         helix.contraction_limit([0.1, 0.2], [1.0, 1.0, 1.0])
-
-
-@each_row("on_contact", ["raise", "", None, 1])
-def test_an_unknown_choice_is_refused_before_anything_is_computed(on_contact: Any) -> None:
-    with pytest.raises(ParameterError, match="'error', 'warn', 'ignore'"):
-        helix.check_self_contact(GOOD, on_contact=on_contact)
 
 
 @each_row("limit", [helix.contraction_limit, helix.simple_contraction_limit])

@@ -2,9 +2,7 @@
 
 from softrobots.helix.actuators import ActuatorTable, contraction_from_stoppers
 from softrobots.helix.contact import (
-    ON_CONTACT,
     SelfContact,
-    SelfContactWarning,
     check_self_contact,
     contraction_limit,
     self_contact,
@@ -34,7 +32,6 @@ from softrobots.helix.varying_actuator import BentTube, bent_tube
 __all__ = [
     "HANDEDNESS",
     "METHODS",
-    "ON_CONTACT",
     "ON_UNREALISABLE",
     "PAPER_CYLINDER",
     "PATHS",
@@ -50,7 +47,6 @@ __all__ = [
     "HelixShape",
     "Pattern",
     "SelfContact",
-    "SelfContactWarning",
     "ShapeError",
     "SheetPoints",
     "Wish",

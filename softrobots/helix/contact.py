@@ -15,7 +15,6 @@ other critical pairs of points. The ends of a shorter tube count as hemispheres,
 from __future__ import annotations
 
 import math
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
@@ -23,33 +22,18 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from softrobots.core.checks import FloatArray, choice, common_shape, positive_array, read_only
+from softrobots.core.checks import FloatArray, common_shape, positive_array, read_only
 from softrobots.core.errors import ParameterError, SelfIntersection
 from softrobots.helix.paths import curvature_torsion
 from softrobots.helix.shapes import HelixShape, checked_angle, checked_shape
 
 BoolArray = NDArray[np.bool_]
 
-ON_CONTACT = ("error", "warn", "ignore")
-"""What `check_self_contact` does if a tube runs into itself."""
-
 _ROUNDING = 1e-9  # of the diameter: a tube that just touches is not in contact
 _MERGED = 1.789775849272223  # 2 pi minus the first root of tan s = s above pi, where minimum and maximum of d(s) merge
 _STEEPEST = 0.21723362821122166  # (b/Rc)^2 there
 _STEEPEST_ANGLE = 0.9760110449  # actuator angle where turns that just touch are that steep: 55.92 degrees [rad]
 _HALVINGS = 64  # from any bracket here to the last digit
-
-
-class SelfContactWarning(UserWarning):
-    """A tube runs into itself, reported because of `on_contact="warn"`.
-
-    Attributes:
-        contact: The `SelfContact` with place and amount.
-    """
-
-    def __init__(self, message: str, *, contact: SelfContact) -> None:
-        super().__init__(message)
-        self.contact = contact
 
 
 @dataclass(frozen=True, eq=False)
@@ -168,28 +152,23 @@ def self_contact(shape: HelixShape, turns: Any = math.inf) -> SelfContact:
     )
 
 
-def check_self_contact(shape: HelixShape, turns: Any = math.inf, *, on_contact: str = "error") -> SelfContact:
-    """Raise or warn if a tube runs into itself.
+def check_self_contact(shape: HelixShape, turns: Any = math.inf) -> SelfContact:
+    """Raise if a tube runs into itself; `self_contact` tells it without an error.
 
     Args:
         shape: The helix, shape (...).
         turns: Turns of the tube, as in `self_contact` [-].
-        on_contact: "error" to raise, "warn" to issue a `SelfContactWarning`, "ignore" for neither.
 
     Returns:
         As `self_contact`.
 
     Raises:
-        ParameterError: If `shape` is not a `HelixShape`, the turns are not positive, the shapes do not broadcast, or
-            `on_contact` is not one of `ON_CONTACT`.
-        SelfIntersection: If any of the tubes runs into itself and `on_contact` is "error".
+        ParameterError: If `shape` is not a `HelixShape`, the turns are not positive, or the shapes do not broadcast.
+        SelfIntersection: If any of the tubes runs into itself.
     """
-    choice("on_contact", on_contact, ON_CONTACT)
     contact = self_contact(shape, turns)
-    if on_contact != "ignore" and np.any(contact.touches):
-        if on_contact == "error":
-            raise SelfIntersection(f"{contact}; contraction_limit gives the smallest possible contraction", contact=contact)
-        warnings.warn(SelfContactWarning(str(contact), contact=contact), stacklevel=2)
+    if np.any(contact.touches):
+        raise SelfIntersection(f"{contact}; contraction_limit gives the smallest possible contraction", contact=contact)
     return contact
 
 

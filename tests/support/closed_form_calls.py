@@ -130,7 +130,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "turns": (helix.turns, {"shape": SHAPE, "angle": 0.0873, "length": 1.0}),
     "height": (helix.height, {"shape": SHAPE, "angle": 0.0873, "length": 1.0}),
     "length_for_turns": (helix.length_for_turns, {"shape": SHAPE, "angle": 0.0873, "turns": 1.0}),
-    "check_self_contact": (helix.check_self_contact, {"shape": SHAPE, "turns": 3.0, "on_contact": "error"}),
+    "check_self_contact": (helix.check_self_contact, {"shape": SHAPE, "turns": 3.0}),
     "contraction_limit": (helix.contraction_limit, {"angle": 0.0873, "diameter": 1.0}),
     "simple_contraction_limit": (helix.simple_contraction_limit, {"angle": 0.0873}),
     "grasp_force": (
