@@ -46,7 +46,6 @@ WITHOUT = {
     "view.live.commands.Wanted": _RESULT,
     "view.meshcat_page.page_text.InlinePage": "a page of somebody else's notebook: test_view_command shows it in a browser",
     "view.identification_page.IdentificationPage": "a page in a browser: test_identification_figures reads what it shows",
-    "view.written_page.WrittenPage": "its methods have laws, under the name of Viewer",
     "view.served_page.ServedPage": "its methods have laws, under the name of Viewer",
     "view.slider_page.SliderPage": "a page in a browser: test_slider_page moves its sliders",
     "interactive": "a page in a browser: test_interactive_page compares what it solves and draws",

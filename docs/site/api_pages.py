@@ -150,7 +150,6 @@ PAGES = {
                 "view",
                 "Viewer",
                 "interactive",
-                "view.written_page.WrittenPage",
                 "view.served_page.ServedPage",
                 "view.meshcat_page.page_text.InlinePage",
                 "view.slider_page.SliderPage",

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, positive_integer
 from softrobots.core.errors import ParameterError, ViewerError
+from softrobots.core.files import new_file
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.vibration import ModeSwing
 from softrobots.model.soft_model import SoftModel, check_model
@@ -17,17 +19,17 @@ from softrobots.statics.equilibrium import Equilibrium, check_same_model
 from softrobots.statics.inverse_kinematics import IkSolution
 from softrobots.view.animation_frames import Movement, playing_time
 from softrobots.view.camera import narrowest
-from softrobots.view.meshcat_page.page_text import legend_rows, live_page, page_text
+from softrobots.view.meshcat_page.page_text import InlinePage, legend_rows, live_page, page_text
 from softrobots.view.meshcat_page.robot import RobotDrawing
 from softrobots.view.meshcat_page.server import ServerProcess, connect, send_html
 from softrobots.view.meshcat_page.stage import Stage
 from softrobots.view.scene import SceneBuilder
-from softrobots.view.written_page import WrittenPage
+from softrobots.view.served_page import ServedPage
 
 _REPETITIONS = 1000  # of an animation: meshcat mixes start and end when it is scrubbed after the last one
 
 
-class Viewer(WrittenPage):
+class Viewer(ServedPage):
     """A meshcat page that shows one robot; a context manager that ends its server.
 
     The deformed robot is opaque; the rigid one, with the same motors and relaxed springs, is translucent. Inflated links are
@@ -210,6 +212,32 @@ class Viewer(WrittenPage):
         """
         self._check_open()
         return page_text(self._page.static_html(), title, self._robot.legend())
+
+    def write_html(self, path: str | Path, *, title: str = "softrobots", overwrite: bool = False) -> Path:
+        """Write `html` to a file, and return its path.
+
+        Raises:
+            OutputExists: If the file exists and `overwrite` is false.
+        """
+        new_file(path, overwrite=overwrite)  # refused before the work
+        return self.inline(title=title).write_html(path, overwrite=overwrite)
+
+    def inline(self, height: int = 480, *, title: str = "softrobots") -> InlinePage:
+        """Return the page as it is now for a cell of a notebook, where it remains when the viewer is closed.
+
+        Args:
+            height: Height in the notebook [px].
+            title: Title of the page.
+
+        Raises:
+            ParameterError: If the height is no positive integer, at most 10000.
+            ViewerError: If the viewer is closed.
+        """
+        return InlinePage(self.html(title), positive_integer("height", height, 10_000))
+
+    def _repr_html_(self) -> str:
+        """Return the page for Jupyter; see `inline`."""
+        return self.inline()._repr_html_()
 
     def close(self) -> None:
         """End the server; the page stays as it is in browsers that show it."""
