@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 
@@ -17,7 +18,6 @@ from softrobots.core.checks import FloatArray, finite_array, finite_number, posi
 from softrobots.core.errors import ParameterError
 from softrobots.description.composition import mount
 from softrobots.description.expansion import expand
-from softrobots.description.paths import xacro_folder
 from softrobots.description.third_party import UR5, robot_file
 from softrobots.model.loader import load_model
 from softrobots.model.soft_model import SoftModel
@@ -180,4 +180,5 @@ class UR5Bench:
 
 def _part(part: str, **numbers: float) -> str:
     """URDF text of a part of the bench."""
-    return expand(xacro_folder() / "bench_part.urdf.xacro", {"part": part, **{name: repr(n) for name, n in numbers.items()}})
+    file = Path(__file__).with_name("bench_part.urdf.xacro")
+    return expand(file, {"part": part, **{name: repr(n) for name, n in numbers.items()}})
