@@ -25,7 +25,7 @@ from softrobots.core.checks import positive_number
 from softrobots.core.files import make_folder, write_text
 from softrobots.statics.loads import Load
 from softrobots.statics.trajectory import METHODS
-from softrobots.view.figures import canvas, trajectories
+from softrobots.view.figures import canvas
 from studies.papers import trajectory_pictures
 from studies.papers.arm_path import DURATION, END, FORCE, GAIN, START, STEPS
 from studies.shared.command_line import serve, tell_written
@@ -242,7 +242,7 @@ def _figures(
         angles = dict(zip(errors, (trajectory.orientation_error, uncompensated.orientation_error), strict=True))
         turns["orientation_errors"] = trajectory_pictures.tip_errors(angles, trajectory.times, angles=True)
     return turns | {
-        "poses": trajectories.poses(trajectory),
+        "poses": trajectory_pictures.poses(trajectory),
         "motor_angles": trajectory_pictures.motor_angles(trajectory, rigid),
         "tip_errors": trajectory_pictures.tip_errors(errors, trajectory.times),
         "link_moments": trajectory_pictures.link_moments(trajectory),

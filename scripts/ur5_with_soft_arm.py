@@ -20,7 +20,8 @@ from softrobots.cli.options.command_line import exit_status
 from softrobots.core.checks import finite_array, non_negative_number, positive_integer, positive_number
 from softrobots.core.files import make_folder, write_text
 from softrobots.description.third_party import UR5, robot_file
-from softrobots.view.figures import canvas, trajectories
+from softrobots.view.figures import canvas
+from studies.papers import trajectory_pictures
 from studies.shared.command_line import serve, tell_written
 from studies.shared.folders import free_folder
 from studies.ur5.soft_arm import PAYLOAD, Load, compensate, follow_line, mounted, soft_arm, within_limits
@@ -93,7 +94,7 @@ def run(arguments: argparse.Namespace) -> Path:
     follow = compensate if arguments.to is None else follow_line
     before, after = follow(model, arguments, load, rigid)
     summary = summarise(before, after, rigid, load, arm)
-    figure = None if arguments.no_plots else trajectories.poses(after, shown=2 if arguments.to is None else 6)
+    figure = None if arguments.no_plots else trajectory_pictures.poses(after, shown=2 if arguments.to is None else 6)
     with sr.view(model, after) as viewer:
         make_folder(folder)
         sr.save_result(after, folder / "result.npz")

@@ -127,7 +127,7 @@ def test_every_public_name_has_a_law() -> None:
     assert {
         "compiled.sweeps.map_workspace",
         "robots.parameter_file.read_robot",
-        "view.figures.trajectories.poses",
+        "view.figures.motions.strobe",
         "view.live.loop.LiveView",
     } <= public_names()
     assert sorted(name for name in public_names() - REGISTERED.keys() if not excused(name)) == []

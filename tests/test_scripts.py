@@ -205,7 +205,6 @@ def test_make_pictures_photographs_the_arm(tmp_path: Path, capsys: pytest.Captur
 
 def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
     """Lines, axis labels with units, legends: read back from the figures."""
-    from softrobots.view.figures import trajectories
     from studies.papers import trajectory_pictures
 
     path = sr.straight_line((0.4, -0.5, 0.6), (1.0, 0.2, 0.2), 2.0, 12)
@@ -218,15 +217,15 @@ def test_plots_show_what_they_say(arm: sr.SoftModel) -> None:
     assert angles.get_ylabel() == "motor angle [rad]"
     moments = trajectory_pictures.link_moments(loaded).axes[0]
     assert moments.get_ylim()[1] > arm.spring_groups[0].wrinkling_moment
-    scene = trajectories.poses(loaded).axes[0]
+    scene = trajectory_pictures.poses(loaded).axes[0]
     ends = np.array(scene.lines[1].get_data_3d())[:, -1]
     assert np.allclose(ends, loaded.tip_positions[0], atol=1e-12)
     errors = trajectory_pictures.tip_errors({"a": loaded.tip_error}, loaded.times).axes[0]
     assert errors.get_yscale() == "log"
     with pytest.raises(sr.ParameterError, match="a Trajectory"):
-        trajectories.poses(None)
+        trajectory_pictures.poses(None)
     with pytest.raises(sr.ParameterError, match="shown"):
-        trajectories.poses(loaded, shown=-2)
+        trajectory_pictures.poses(loaded, shown=-2)
     with pytest.raises(sr.ParameterError, match="errors"):
         trajectory_pictures.tip_errors({"a": loaded.tip_error[:3]}, loaded.times)
     with pytest.raises(sr.ParameterError, match="13 waypoints"):

@@ -30,7 +30,6 @@ from softrobots.statics.inverse_kinematics import ELBOWS, solve_ik
 from softrobots.statics.time_law import read_waypoints
 from softrobots.statics.tip_search import POSITION_TOLERANCE
 from softrobots.statics.trajectory import METHODS, follow_trajectory
-from softrobots.view.figures import trajectories
 from softrobots.view.figures.picture import plot
 
 _EXAMPLES = """examples:
@@ -87,7 +86,7 @@ def add_parser(subparsers: Any) -> None:
     help_text = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
     parser.add_argument("--allow-jumps", action="store_true", help=help_text)
     add_output(parser, "the solution or trajectory", ROS_FORMS)
-    add_plot(parser, "the loaded shape, or the poses along the path")
+    add_plot(parser, "the loaded shape, with the path of the tip")
     add_json(parser)
     parser.set_defaults(run=run)
 
@@ -112,7 +111,7 @@ def run(arguments: argparse.Namespace) -> None:
     trajectory = follow_trajectory(
         model, path.targets, **options, times=path.times, gain=gain, allow_jumps=arguments.allow_jumps, progress="waypoints"
     )
-    files = save(arguments, trajectory) + write_plot(arguments, lambda: trajectories.poses(trajectory))
+    files = save(arguments, trajectory) + write_plot(arguments, lambda: plot(trajectory))
     print_answer(arguments, trajectory_answer(trajectory), trajectory.summary(None), files)
 
 

@@ -1,7 +1,4 @@
-"""The figures of the three papers that can be drawn again. Needs matplotlib (extra `plot`).
-
-Figures of trajectories, links and helices are those of `softrobots.view.figures`; here are the others.
-"""
+"""The figures of the three papers that can be drawn again. Needs matplotlib (extra `plot`)."""
 
 from __future__ import annotations
 
@@ -13,7 +10,6 @@ import numpy as np
 from softrobots import constant_curvature as cc
 from softrobots import helix
 from softrobots.inflated_beam import TABLE_3
-from softrobots.view.figures import trajectories
 from softrobots.view.figures.canvas import COLOURS, WIDTH, equal_box, new_figure
 from studies.papers import helices, link_pictures, pcc_equations, pcc_two_segments, trajectory_pictures
 from studies.papers.arm_path import GAIN, movement
@@ -109,7 +105,7 @@ PICTURES: Mapping[str, Mapping[str, Picture]] = {
     "inflatable_arm": {
         "arm_law": Picture(moment_angle_law, "Figure 9: the curves, from Table 3. The points of the tests are not published."),
         "arm_poses": Picture(
-            lambda: trajectories.poses(movement().loaded), "Figure 10: the arm along a path; start and end are ours."
+            lambda: trajectory_pictures.poses(movement().loaded), "Figure 10: the arm along a path; start and end are ours."
         ),
         "arm_angles": Picture(
             lambda: trajectory_pictures.motor_angles(movement().loaded, movement().rigid),

@@ -1,4 +1,4 @@
-"""Figures of a trajectory, after Figure 11 of [Troise 2021]: motor angles, errors of the tip, moments of links."""
+"""Figures of a trajectory, after Figures 10 and 11 of [Troise 2021]: poses, motor angles, errors of the tip, moments of links."""
 
 from __future__ import annotations
 
@@ -6,10 +6,57 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, instance_of
+from softrobots.core.checks import FloatArray, finite_array, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
+from softrobots.statics.equilibrium import Equilibrium
+from softrobots.statics.kinematics import backbone
 from softrobots.statics.trajectory import Trajectory
-from softrobots.view.figures.canvas import COLOURS, MARKERS, WIDTH, line_style, new_plot, plain_words
+from softrobots.view.figures.canvas import COLOURS, MARKERS, WIDTH, equal_box, line_style, new_plot, new_space, plain_words
+
+
+def poses(trajectory: Trajectory, *, shown: int = 6) -> Any:
+    """Backbone of the arm at some waypoints, deformed and rigid, with the path: after [Troise 2021] Figure 10.
+
+    Where the targets are poses, the axes of the tip are drawn, too.
+
+    Args:
+        trajectory: The trajectory.
+        shown: How many poses, evenly spaced.
+
+    Returns:
+        The figure.
+
+    Raises:
+        ParameterError: If it is no trajectory, or `shown` is not positive.
+        MissingDependency: If matplotlib is not installed.
+    """
+    positive_integer("shown", shown)
+    instance_of("trajectory", trajectory, Trajectory, "a Trajectory")
+    figure, axes = new_space((WIDTH, 6.2), "Loaded arm along the path")
+    model = trajectory.model
+    chosen = np.unique(np.linspace(0, len(trajectory.times) - 1, shown).round().astype(int))
+    everything = [trajectory.tip_positions]
+    for count, place in enumerate(chosen):
+        equilibrium = trajectory.equilibria[place]
+        shade = 0.75 - 0.65 * count / max(len(chosen) - 1, 1)
+        loaded = backbone(model, equilibrium.q)
+        rigid = backbone(model, model.configuration(equilibrium.q_motors))
+        first = count == 0
+        axes.plot(*rigid.T, color="#7f7f7f", lw=1.0, ls=":", label="rigid arm, same motor angles" if first else None)
+        label = "loaded arm, later is darker" if first else None
+        axes.plot(*loaded.T, color=(shade, shade, shade), lw=2.5, marker="o", ms=3.5, label=label)
+        everything.append(loaded)
+        if trajectory.orientations is not None:
+            pose = equilibrium.transform_tip_to_world
+            for name, shape, axis in zip("xyz", ((0, "-"), (3, "--"), (4, ":")), pose.rotation.T, strict=True):
+                line = np.array([pose.translation, pose.translation + 0.07 * model.reach * axis])
+                label = f"{name} axis of the tip" if first else None
+                axes.plot(*line.T, color=COLOURS[shape[0]], lw=2.0, ls=shape[1], label=label)
+    axes.plot(*trajectory.tip_positions.T, color=COLOURS[1], lw=2.0, ls="--", label="path of the tip")
+    everything.append(_force_arrow(axes, trajectory.equilibria[-1]))
+    equal_box(axes, np.vstack(everything))
+    axes.legend(loc="upper left", fontsize=9)
+    return figure
 
 
 def motor_angles(trajectory: Trajectory, rigid: Trajectory) -> Any:
@@ -97,3 +144,15 @@ def link_moments(trajectory: Trajectory) -> Any:
     axes.set_ylim(0.0, 1.12 * max(float(moments.max()), float(limits.max())))
     axes.legend(fontsize=9)
     return figure
+
+
+def _force_arrow(axes: Any, equilibrium: Equilibrium) -> FloatArray:
+    """Draw the force at the tip as an arrow a fifth of the reach long; return its end, shape (1, 3) [m], (0, 3) without one."""
+    tip = equilibrium.tip_position
+    wrench = equilibrium.load.wrenches.get(equilibrium.model.tip)
+    if wrench is None or not wrench[:3].any():
+        return np.zeros((0, 3))
+    size = float(np.linalg.norm(wrench[:3]))
+    arrow = 0.2 * equilibrium.model.reach * wrench[:3] / size
+    axes.quiver(*tip, *arrow, color=COLOURS[2], lw=2.0, label=f"force {size:.3g} N")
+    return np.asarray(tip + arrow)[None]

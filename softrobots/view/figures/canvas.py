@@ -12,7 +12,6 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import MissingDependency
 from softrobots.core.files import write_bytes
-from softrobots.statics.equilibrium import Equilibrium
 from softrobots.view.appearance import CONTACT_COLOUR, FORCE_COLOUR, PATH_COLOUR
 
 COLOURS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#E69F00", "#56B4E9")  # Okabe and Ito
@@ -133,19 +132,3 @@ def equal_box(axes: Any, points: FloatArray, eye: Any = (0.44, -0.82, 0.38)) -> 
     axes.set_box_aspect(half / half.max(), zoom=0.9)
     x, y, z = np.asarray(eye) / np.linalg.norm(eye)
     axes.view_init(elev=np.degrees(np.arcsin(z)), azim=np.degrees(np.arctan2(y, x)))
-
-
-def force_arrow(axes: Any, equilibrium: Equilibrium) -> FloatArray:
-    """Draw the force at the tip, if there is one, as an arrow a fifth of the reach long.
-
-    Returns:
-        The end of the arrow for `equal_box`, shape (1, 3) [m], or (0, 3) without a force.
-    """
-    tip = equilibrium.tip_position
-    wrench = equilibrium.load.wrenches.get(equilibrium.model.tip)
-    if wrench is None or not wrench[:3].any():
-        return np.zeros((0, 3))
-    size = float(np.linalg.norm(wrench[:3]))
-    arrow = 0.2 * equilibrium.model.reach * wrench[:3] / size
-    axes.quiver(*tip, *arrow, color=COLOURS[2], lw=2.0, label=f"force {size:.3g} N")
-    return np.asarray(tip + arrow)[None]
