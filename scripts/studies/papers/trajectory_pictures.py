@@ -1,4 +1,4 @@
-"""Figures of a trajectory, after Figures 10 and 11 of [Troise 2021]: poses, motor angles, errors of the tip, moments of links."""
+"""Figures of a trajectory, after Figures 10 and 11 of [Troise 2021]: poses, motor angles, tip errors, moments of links."""
 
 from __future__ import annotations
 
