@@ -24,7 +24,7 @@ REST = float(PccArm.segment_lengths[0])
 
 _EXAMPLES = """examples:
   softrobots pcc forward 0.50 0.53 0.55  0.54 0.51 0.52            muscle lengths of two segments -> arcs, poses
-  softrobots pcc forward 0.50 0.53 0.55 --distance 0.03 --jacobian
+  softrobots pcc forward 0.50 0.53 0.55 --distance 0.03
   softrobots pcc forward 0.5 0.52 0.5 0.48 --azimuths 0 1.5708 3.1416 -1.5708     one segment of four muscles
   softrobots pcc inverse --arc 0.52 0.7 -0.4 --arc 0.53 0.5 1.2    arcs -> muscle lengths
 
@@ -34,8 +34,7 @@ All lengths in m, all angles in rad. Defaults are those of the robot pcc_arm. Th
 
 _JSON = """With --json: one object with these names, and their units under "units": muscle_lengths (segment, muscle),
 muscle_extension (length over rest length, less 1), muscle_residual (segment), arc_length, arc_bending, arc_azimuth (segment),
-transforms (segment, 4, 4; end of a segment to base), tip_position, tip_direction (its z axis), jacobian (6, muscles; of
-the tip, linear rows first; null without --jacobian), and frame.
+transforms (segment, 4, 4; end of a segment to base), tip_position, tip_direction (its z axis), and frame.
 """
 
 
@@ -43,7 +42,7 @@ def add_parser(subparsers: Any) -> None:
     """Add the subcommand."""
     parser = subparsers.add_parser(
         "pcc",
-        help="constant curvature in closed form: muscle lengths, arcs, poses, Jacobians",
+        help="constant curvature in closed form: muscle lengths, arcs, poses",
         description="Segments of constant curvature in closed form, without load: any number of segments and muscles.",
         epilog=_EXAMPLES,
     )
@@ -80,8 +79,6 @@ def _form(forms: Any, name: str, run: Callable[[argparse.Namespace], None], summ
     parser.set_defaults(run=run)
     help_text = "frame at the end of a segment: without torsion, or turning with the bending plane as the paper's (%(default)s)"
     parser.add_argument("--frame", choices=FRAMES, default=FRAMES[0], help=help_text)
-    help_text = "also the Jacobian of the tip with respect to muscle lengths [m/m, rad/m] (left out)"
-    parser.add_argument("--jacobian", action="store_true", help=help_text)
     add_json(parser)
     return parser
 
@@ -130,11 +127,6 @@ def _answer(arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, dista
     rest = _per_segment("--rest", arguments.rest or [REST], len(lengths))
     transforms = constant_curvature.chain_transforms(arcs, offsets, frame)
     residual = constant_curvature.muscle_residual(lengths, distance, azimuths)
-    jacobian, unit = None, ""
-    if arguments.jacobian:
-        tolerance = getattr(arguments, "tolerance", 1e-6)
-        jacobian = constant_curvature.chain_muscle_jacobian(lengths, distance, azimuths, offsets, frame, tolerance)
-        unit = "m/m (rows 1 to 3), rad/m (rows 4 to 6)"
     facts = [
         Fact("muscle_lengths", lengths, "m", "muscle lengths"),
         Fact("muscle_extension", lengths / rest[:, None] - 1.0, "-", "extension of the muscles"),
@@ -145,7 +137,6 @@ def _answer(arguments: argparse.Namespace, lengths: FloatArray, arcs: Arc, dista
         Fact("transforms", transforms, "m", "poses of the ends of the segments"),
         Fact("tip_position", transforms[-1, :3, 3], "m", "tip"),
         Fact("tip_direction", transforms[-1, :3, 2], "-", "tip points along"),
-        Fact("jacobian", jacobian, unit, "Jacobian"),
         Fact("frame", frame, "", "frame"),
     ]
     print_answer(arguments, answer_of(facts), _lines(facts))
@@ -163,19 +154,12 @@ def _lines(facts: list[Fact]) -> list[str]:
         muscle_rows.append((str(number), "  ".join(muscles)))
     lines = [*aligned(rows), "", *aligned(muscle_rows), ""]
     lines += [f"pose of the tip in the base, {values['frame'].replace('_', '-')} frames [-, m]"]
-    lines += _matrix(values["transforms"][-1])
-    if values["jacobian"] is not None:
-        lines += ["", "Jacobian of the tip, a column a muscle: linear [m/m], then angular [rad/m]"]
-        lines += _matrix(values["jacobian"])
+    rows = [tuple(map(_six, row)) for row in values["transforms"][-1]]
+    lines += aligned(rows, indent="  ", right=range(4))
     worst = float(np.max(values["muscle_residual"]))
     if worst > 1e-12:  # three muscles always fit, up to rounding
         lines += ["", f"the lengths miss those of the arcs by up to {worst:.3g} m"]
     return lines
-
-
-def _matrix(matrix: FloatArray) -> list[str]:
-    rows = [tuple(map(_six, row)) for row in matrix]
-    return aligned(rows, indent="  ", right=range(len(rows[0])))
 
 
 def _six(number: float) -> str:
