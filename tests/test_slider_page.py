@@ -283,20 +283,6 @@ def test_tendons_become_dashed_and_whole_again() -> None:
             assert ("tendon_3_3: slack" in panel_html(page)) == slack
 
 
-def test_the_rigid_arm_and_the_path_can_be_switched(page: SliderPage) -> None:
-    assert drawn_boxes(page, "rigid")
-    page._panel._rigid.value = False
-    wait_for(lambda: not drawn_boxes(page, "rigid"))
-    assert "path" not in page._drawing.handles
-    page._panel._path.value = True
-    wait_for(lambda: "path of the tip" in panel_html(page))
-    page.set(q_motors=(0, 0.3, 0))
-    page.set(q_motors=(0, 0.6, 0))
-    points = np.asarray(page._drawing.handles["path"].points)
-    assert np.allclose(points[-1], page.equilibrium.tip_position, atol=1e-6)  # single precision
-    assert len(points) == 3
-
-
 @pytest.mark.parametrize(("shape", "volume"), [
     # A prism of 32 sides; a ball of 16 rings of them has 3 per cent less than a round one.
     (coal.Box(0.1, 0.2, 0.3), pytest.approx(0.006, rel=1e-9)),

@@ -23,8 +23,6 @@ from softrobots.view.viser_page.server import start_server
 from softrobots.view.viser_page.slider_panel import Setting, SliderPanel
 from softrobots.view.warm_start import next_equilibrium
 
-_TRAIL = 2000  # most points of the path of the tip
-
 
 class SliderPage(ServedPage):
     """A page with sliders for one robot, served by viser on loopback only; a context manager that ends its server.
@@ -77,7 +75,6 @@ class SliderPage(ServedPage):
         self._equilibrium = self._solve_from_rest(self._start)
         self._last: Setting | None = self._start
         self._problem: Exception | None = None
-        self._trail: list[FloatArray] = []
         self._scenes = SceneBuilder(model)
         self._lock, self._wake, self._closed = threading.Lock(), threading.Event(), threading.Event()
         self._worker = threading.Thread(target=self._follow, name="softrobots sliders", daemon=True)
@@ -88,7 +85,6 @@ class SliderPage(ServedPage):
             seen = self._scenes.corners([self._scenes.loaded(self._equilibrium)])
             self._drawing.look_at(self._equilibrium.tip_position, seen)
             self._panel = SliderPanel(self._server.gui, model, self._start, self._full, changed=self._wake.set)
-            self._read_scene()
             self._draw()
             self._report()
         except BaseException:
@@ -156,7 +152,7 @@ class SliderPage(ServedPage):
             with self._lock:
                 if self._panel.take_reset():
                     self._panel.move_to(self._start)
-                    self._equilibrium, self._trail, self._last = self._solve_from_rest(self._start), [], None
+                    self._equilibrium, self._last = self._solve_from_rest(self._start), None
                 setting = self._panel.setting
                 if self._last is not None and not self._model.actuators.independent:
                     setting = setting._replace(q_motors=_fitting(self._model, self._last.q_motors, setting.q_motors))
@@ -170,8 +166,7 @@ class SliderPage(ServedPage):
                 self._last, self._problem = setting, None
                 gravity = self._gravity if setting.gravity else None
                 self._equilibrium = next_equilibrium(self._equilibrium, setting.q_motors, setting.force, gravity=gravity)
-                self._read_scene()
-            self._draw()
+                self._draw()
         except Exception as error:  # any error: the thread must go on with the next change
             self._problem = error
         self._report()
@@ -182,18 +177,14 @@ class SliderPage(ServedPage):
         obstacles = self._environment
         return solve_equilibrium(self._model, setting.q_motors, setting.force, gravity=gravity, environment=obstacles)
 
-    def _read_scene(self) -> None:
-        """Take the scene of a new equilibrium."""
-        self._trail = [*self._trail[1 - _TRAIL :], self._equilibrium.tip_position]
-        self._scene = self._scenes.loaded(self._equilibrium)
-
     def _draw(self) -> None:
-        """Draw the scene, and what check boxes switch on and off."""
-        self._drawing.show(self._scene, rigid=self._panel.rigid, path=np.array(self._trail) if self._panel.path else None)
+        """Draw the equilibrium."""
+        self._scene = self._scenes.loaded(self._equilibrium)
+        self._drawing.show(self._scene)
 
     def _report(self) -> None:
         """Write facts and legend into the panel."""
-        rows = legend(self._scenes.robot.shapes, self._scene, path=self._panel.path)
+        rows = legend(self._scenes.robot.shapes, self._scene)
         self._panel.report(self._equilibrium, rows, "" if self._problem is None else str(self._problem))
 
     def _checked_motors(self, value: Any) -> tuple[float, ...]:

@@ -1,4 +1,4 @@
-"""A robot on a page of viser: its links, body, forces and path, drawn from scenes."""
+"""A robot on a page of viser: its links, body and forces, drawn from scenes."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ class ViserDrawing:
         self._server, self._extent, self._unit_force = server, extent, unit_force
         self._shapes = [(shape, *triangles(shape.geometry)) for shape in shapes]
         self.handles: dict[str, Any] = {}
-        """Viser's handle of each mesh that is shown, and of the path, by name."""
+        """Viser's handle of each mesh that is shown, by name."""
         # Viser's default light is a photograph; under even light colours look like those of the legend.
         scene = server.scene
         scene.configure_environment_map(None)
@@ -66,27 +66,16 @@ class ViserDrawing:
         """Place the camera of browsers that connect later; the arguments are those of `Extent.camera`."""
         self._server.initial_camera.position, self._server.initial_camera.look_at = self._extent.camera(tip, points)
 
-    def show(self, scene: Scene, *, rigid: bool, path: FloatArray | None) -> None:
-        """Show a state, in one message.
-
-        Args:
-            scene: The state.
-            rigid: Whether the rigid robot is shown.
-            path: Positions of the dots of a path, shape (n, 3) [m]; None: no path.
-        """
-        meshes = dict(self._meshes(scene, rigid))
+    def show(self, scene: Scene) -> None:
+        """Show a state, in one message."""
+        meshes = dict(self._meshes(scene))
         with self._server.atomic():
-            for name in [name for name in self.handles if name not in meshes and (name != "path" or path is None)]:
+            for name in [name for name in self.handles if name not in meshes]:
                 self.handles.pop(name).remove()
             for name, mesh in meshes.items():
                 self._show_mesh(name, mesh)
-            if path is not None and "path" in self.handles:
-                self.handles["path"].points = path
-            elif path is not None:
-                style = {"point_size": appearance.DOT_SIZE * self._extent.size, "point_shape": "circle", "precision": "float32"}
-                self.handles["path"] = self._server.scene.add_point_cloud("/path", path, rgb(appearance.PATH_COLOUR), **style)
 
-    def _meshes(self, scene: Scene, rigid: bool) -> Iterator[tuple[str, Mesh]]:
+    def _meshes(self, scene: Scene) -> Iterator[tuple[str, Mesh]]:
         """Name and triangles of everything that is shown."""
         for (shape, corners, faces, flat), pose, relaxed in zip(self._shapes, scene.deformed, scene.rigid, strict=True):
             colour: Colour = shape.colour
@@ -94,7 +83,7 @@ class ViserDrawing:
                 level = scene.wrinkling[shape.inflated_link] if scene.wrinkling else 0
                 colour = (*WRINKLING_COLOURS[level][1], shape.colour[3])
             yield f"deformed/{shape.name}", Mesh(corners, faces, pose, colour, flat)
-            if rigid and shape.elastic:
+            if shape.elastic:
                 yield f"rigid/{shape.name}", Mesh(corners, faces, relaxed, appearance.RIGID_COLOUR, flat)
         for part in body_parts(scene):
             yield f"body/{part.path}", Mesh(*part.surface(), np.eye(4), part.colour)

@@ -56,10 +56,8 @@ class SliderPanel:
         with gui.add_folder("load"):
             force = zip("xyz", start.force, strict=True)
             self._force = [self._slider(f"force {axis}", "N", -full_force, full_force, value) for axis, value in force]
-            self._gravity = self._checkbox("gravity", start.gravity)
-        with gui.add_folder("picture"):
-            self._rigid = self._checkbox("show rigid arm", True)
-            self._path = self._checkbox("path of the tip", False)
+            self._gravity = gui.add_checkbox("gravity", start.gravity)
+            self._gravity.on_update(self._moved)
         button = gui.add_button("reset", hint="back to the start, with relaxed springs")
 
         button.on_click(self._pressed)
@@ -70,16 +68,6 @@ class SliderPanel:
         """The values now."""
         motors, force = (tuple(slider.value for slider in sliders) for sliders in (self._motors, self._force))
         return Setting(motors, force, self._gravity.value)
-
-    @property
-    def rigid(self) -> bool:
-        """Whether the rigid robot is visible."""
-        return bool(self._rigid.value)
-
-    @property
-    def path(self) -> bool:
-        """Whether the path of the tip is visible."""
-        return bool(self._path.value)
 
     def take_reset(self) -> bool:
         """Return whether the reset button was pressed since the last call."""
@@ -107,11 +95,6 @@ class SliderPanel:
         # Viser shows as many digits as the initial value has.
         handle = self._gui.add_slider(f"{name} [{unit}]", first, last, step, first)
         handle.value = value
-        handle.on_update(self._moved)
-        return handle
-
-    def _checkbox(self, label: str, ticked: bool) -> Any:
-        handle = self._gui.add_checkbox(label, ticked)
         handle.on_update(self._moved)
         return handle
 
