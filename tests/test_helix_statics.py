@@ -16,7 +16,7 @@ import softrobots as sr
 from softrobots.robots import HelixTube
 from softrobots.statics.kinematics import frame_placement
 from softrobots.statics.loads import distributed_force
-from softrobots.view.body import body
+from softrobots.view.body import body_at
 from tests.support.helix_rods import (
     HelixRod,
     actuated_rod,
@@ -140,7 +140,7 @@ def test_a_wrench_along_its_axis_bends_a_chain_of_sections_into_the_exact_helix(
     assert np.allclose(frames, exact, atol=1e-10, rtol=0)
     assert np.allclose(found.strains, [0.0, curvature, torsion, stretch], atol=1e-8)
     assert np.allclose(found.link_moments, abs(love.moment), rtol=1e-8)
-    (segment,) = body(found, 4)
+    (segment,) = body_at(found.model, found.q_motors, found.q_springs, 4)
     along = helix_frames(curvature / stretch, torsion / stretch, whole * np.arange(25) / 24)
     assert np.allclose(segment.poses, along, atol=1e-10, rtol=0)
 
@@ -157,7 +157,7 @@ def test_a_wrench_along_its_axis_bends_lumped_chains_into_the_helix_in_second_or
         exact = helix_frames(curvature / stretch, torsion / stretch, [stretch * one.length])[0]
         found = sr.solve_equilibrium(arm, (), wrench=love.wrench)
         errors.append(misses(found, exact[:3, 3], exact[:3, :3]))
-        (segment,) = body(found, 3)
+        (segment,) = body_at(found.model, found.q_motors, found.q_springs, 3)
         assert np.allclose(segment.poses[0], np.eye(4), atol=1e-13)
         gaps.append(np.linalg.norm(segment.backbone[-1] - found.tip_position))
     assert orders(errors).min() > 1.8

@@ -28,7 +28,7 @@ from softrobots.description.urdf_tags import NAMESPACE
 from softrobots.robots import PccArm
 from softrobots.statics.kinematics import frame_placement
 from softrobots.view.actuator_curves import actuator_curves
-from softrobots.view.body import BentSections, body, body_at
+from softrobots.view.body import BentSections, body_at
 from tests.support.laws import law
 from tests.support.tables import each_row
 from tests.support.urdf_reading import (
@@ -928,7 +928,7 @@ def test_body_of_an_equilibrium() -> None:
     """Drawn where the statics says: its end is the tip."""
     model = sr.load_model(PccArm())
     found = sr.solve_equilibrium(model, LENGTHS, (1.0, -2.0, 0.5))
-    segments = body(found)
+    segments = body_at(found.model, found.q_motors, found.q_springs)
     assert np.allclose(segments[-1].poses[-1], found.transform_tip_to_world.homogeneous, atol=1e-12)
     assert np.allclose(segments[0].poses[-1][:3, 3], segments[1].poses[0][:3, 3], atol=1e-12)
 
@@ -965,8 +965,6 @@ def test_volume_of_the_body_is_that_of_the_tube() -> None:
 
 
 def test_a_robot_without_sections_has_no_body(arm: sr.SoftModel) -> None:
-    assert body(sr.solve_equilibrium(arm, (0, 0, 0))) == ()
-    with pytest.raises(sr.ParameterError, match="an Equilibrium"):
-        body(arm)
+    assert body_at(arm, np.zeros(3), np.zeros(4)) == ()
     with pytest.raises(sr.ParameterError, match="points"):
         body_at(arm, np.zeros(3), np.zeros(4), 0)

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.view.body import body
+from softrobots.view.body import body_at
 from softrobots.view.viewer import Viewer, view
 from tests.support.pictures import pictures_of
 
@@ -59,7 +59,7 @@ def test_viewer_takes_every_kind_of_continuum_arm() -> None:
 def test_what_is_drawn_is_the_body(pcc: sr.SoftModel) -> None:
     """Corners of the tube stand a radius from the backbone: read back from what the page gets."""
     loaded = sr.solve_equilibrium(pcc, HELD, (6, 4, -3))
-    for segment in body(loaded):
+    for segment in body_at(loaded.model, loaded.q_motors, loaded.q_springs):
         corners, triangles = segment.surface()
         rings = corners[:-2].reshape(len(segment.backbone), -1, 3)
         assert np.allclose(np.linalg.norm(rings - segment.backbone[:, None], axis=2), 0.05, atol=1e-12)

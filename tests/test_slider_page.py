@@ -18,7 +18,7 @@ import pytest
 
 import softrobots as sr
 from softrobots.view import slider_page
-from softrobots.view.body import body
+from softrobots.view.body import body_at
 from softrobots.view.mesh_triangles import triangles
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.scene import WRINKLING_COLOURS, wrinkling_level
@@ -262,7 +262,7 @@ def test_a_body_bends_without_becoming_another_object() -> None:
         tube = page._drawing.handles["body/segment_1/tube"]
         shown = page.set(q_motors=(0.47, 0.53, 0.55))
         assert page._drawing.handles["body/segment_1/tube"] is tube
-        corners, _ = body(shown)[0].surface()
+        corners, _ = body_at(shown.model, shown.q_motors, shown.q_springs)[0].surface()
         assert np.allclose(tube.vertices, corners, atol=1e-6)  # viser holds single precision
         forces = shown.muscle_forces.tolist()
         for name, force in zip(pcc.motor_joints, forces, strict=True):

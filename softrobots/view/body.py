@@ -8,9 +8,8 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.constant_curvature.screws import Screw
-from softrobots.core.checks import FloatArray, instance_of, positive_integer
+from softrobots.core.checks import FloatArray, positive_integer
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.kinematics import backbone
 
 
@@ -91,23 +90,6 @@ def tube(rotations: FloatArray, centres: FloatArray, radius: FloatArray | float,
     caps = [np.column_stack([after, around, np.full(sides, first)])]
     caps.append(np.column_stack([top + around, top + after, np.full(sides, last)]))
     return np.concatenate([corners.reshape(-1, 3), centres[[0, -1]]]), np.concatenate([low, high, *caps])
-
-
-def body(equilibrium: Equilibrium, points: int = 12) -> tuple[SegmentBody, ...]:
-    """Return the shape of the body of a loaded robot; see `body_at`.
-
-    Args:
-        equilibrium: The loaded robot.
-        points: Points for each section, besides the start of the segment.
-
-    Returns:
-        The segments, base to tip; empty for a robot without sections.
-
-    Raises:
-        ParameterError: If `equilibrium` is no Equilibrium, or `points` is not positive.
-    """
-    instance_of("equilibrium", equilibrium, Equilibrium, "an Equilibrium")
-    return body_at(equilibrium.model, equilibrium.q_motors, equilibrium.q_springs, points)
 
 
 def robot_line(model: SoftModel, q_motors: FloatArray, q_springs: FloatArray, points: int = 12) -> FloatArray:
