@@ -1,4 +1,8 @@
-"""Figures of choices around a fit: which set of parameters, and which poses to measure. Needs matplotlib (extra `plot`)."""
+"""Figures of choices around a fit: which set of parameters, and which poses to measure. Needs matplotlib (extra `plot`).
+
+Each function returns a `matplotlib.figure.Figure`. Errors are ParameterError for another result, MissingDependency without
+matplotlib.
+"""
 
 from __future__ import annotations
 
@@ -13,15 +17,7 @@ from softrobots.view.figures.canvas import COLOURS, WIDTH, line_style, new_plot,
 
 
 def cross_validation(result: CrossValidation) -> Any:
-    """Mean error of each set of parameters on families that its fits have not seen, with standard errors, a dot a family.
-
-    Args:
-        result: The comparison.
-
-    Raises:
-        ParameterError: If it is no comparison.
-        MissingDependency: If matplotlib is not installed.
-    """
+    """Mean error of each set of parameters on families that its fits have not seen, with standard errors, a dot a family."""
     instance_of("result", result, CrossValidation, "a CrossValidation")
     scale, unit = (1e3, "mm") if result.unit == "m" else (1.0, result.unit)
     figure, axes = new_plot((WIDTH, 1.7 + 0.55 * len(result.sets)), xlabel=f"error on the family left out [{unit}]")
@@ -43,15 +39,7 @@ def cross_validation(result: CrossValidation) -> Any:
 
 
 def informative(result: InformativePoses) -> Any:
-    """Expected intervals with other poses, relative to those with the chosen ones; a line a parameter.
-
-    Args:
-        result: The choice.
-
-    Raises:
-        ParameterError: If it is no choice of poses.
-        MissingDependency: If matplotlib is not installed.
-    """
+    """Expected intervals with other poses, relative to those with the chosen ones; a line a parameter."""
     instance_of("result", result, InformativePoses, "InformativePoses")
     label = "width of the interval, relative to that with the chosen poses [-]"
     figure, axes = new_plot((WIDTH, 1.7 + 0.36 * len(result.names)), xlabel=label, xscale="log")

@@ -1,6 +1,7 @@
 """Figures of parameters that were fitted to measurements. Needs matplotlib (extra `plot`).
 
-The functions return a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`.
+Each function takes a fit and returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Errors are ParameterError
+for what is no fit, MissingDependency without matplotlib.
 """
 
 from __future__ import annotations
@@ -34,30 +35,14 @@ class _Part(NamedTuple):
 
 
 def identification_figures(result: Identification) -> dict[str, Any]:
-    """Return every figure of a fit by a name for its file; a figure with nothing to show is left out.
-
-    Args:
-        result: The fit.
-
-    Raises:
-        ParameterError: If it is no fit.
-        MissingDependency: If matplotlib is not installed.
-    """
+    """Return every figure of a fit by a name for its file; a figure with nothing to show is left out."""
     found = {"residuals": residuals(result), "predicted": predicted(result), "values": values(result)}
     determined = int(np.sum(result.by_rows.determined))
     return found | ({"correlation": correlation(result), "ellipses": ellipses(result)} if determined > 1 else {})
 
 
 def residuals(result: Identification) -> Any:
-    """Measured minus predicted by row, a panel for each quantity; blocks are shaded in turn, outliers are ringed.
-
-    Args:
-        result: The fit.
-
-    Raises:
-        ParameterError: If it is no fit.
-        MissingDependency: If matplotlib is not installed.
-    """
+    """Measured minus predicted by row, a panel for each quantity; blocks are shaded in turn, outliers are ringed."""
     instance_of("result", result, Identification, "an Identification")
     rows = result.fitted.measurements
     parts = [(key, part) for key in rows.measured for part in _parts(result.fitted, key)]
@@ -89,15 +74,7 @@ def residuals(result: Identification) -> Any:
 
 
 def predicted(result: Identification) -> Any:
-    """Predicted over measured numbers, a panel for each component of each quantity; hollow: rows kept aside.
-
-    Args:
-        result: The fit.
-
-    Raises:
-        ParameterError: If it is no fit.
-        MissingDependency: If matplotlib is not installed.
-    """
+    """Predicted over measured numbers, a panel for each component of each quantity; hollow: rows kept aside."""
     instance_of("result", result, Identification, "an Identification")
     panels = [
         (key, part, number)
@@ -129,13 +106,6 @@ def values(result: Identification) -> Any:
 
     The thick bar is the interval from rows, the thin one that from blocks; a grey band is the prior, two standard deviations
     to both sides. The numbers are value, and interval from rows. Beyond the scale, bars are cut.
-
-    Args:
-        result: The fit.
-
-    Raises:
-        ParameterError: If it is no fit.
-        MissingDependency: If matplotlib is not installed.
     """
     instance_of("result", result, Identification, "an Identification")
     intervals, blocks = result.intervals, result.block_intervals
@@ -175,15 +145,7 @@ def values(result: Identification) -> Any:
 
 
 def correlation(result: Identification) -> Any:
-    """Correlation of the errors of the parameters, from rows; those that are not determined are left out.
-
-    Args:
-        result: The fit.
-
-    Raises:
-        ParameterError: If it is no fit.
-        MissingDependency: If matplotlib is not installed.
-    """
+    """Correlation of the errors of the parameters, from rows; those that are not determined are left out."""
     instance_of("result", result, Identification, "an Identification")
     kept = np.flatnonzero(result.by_rows.determined)
     found = result.by_rows.correlation[np.ix_(kept, kept)]
@@ -210,13 +172,6 @@ def ellipses(result: Identification) -> Any:
     The ellipse of the fitted coordinates, in which a positive parameter is its logarithm: all points within `2 F` of the value
     by the inverse of their covariance, with the quantile of the F distribution of 2 and as many degrees of freedom as the
     covariance has.
-
-    Args:
-        result: The fit.
-
-    Raises:
-        ParameterError: If it is no fit.
-        MissingDependency: If matplotlib is not installed.
     """
     instance_of("result", result, Identification, "an Identification")
     rows, blocks = result.by_rows, result.by_blocks
