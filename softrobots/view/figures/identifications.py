@@ -1,7 +1,7 @@
 """Figures of parameters that were fitted to measurements. Needs matplotlib (extra `plot`).
 
-Each function takes a fit and returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Errors are ParameterError
-for what is no fit, MissingDependency without matplotlib.
+Each function takes a fit and returns a `matplotlib.figure.Figure`; save it with `figure.savefig(path)`. Errors are
+ParameterError for what is no fit, MissingDependency without matplotlib.
 """
 
 from __future__ import annotations
