@@ -179,7 +179,7 @@ def test_help_fits_80_columns_and_its_examples_stay_the_same_commands(
         (["branches", "inflatable_arm", "--direction", "0", "0", "0"], "--direction must be different from zero"),
         (["solve", "inflatable_arm", "--moment", "nan", "0", "0"], "--moment must be an array"),
         (["solve", "inflatable_arm", "--wrench", "tip", *"00000", "inf"], "--wrench must be an array"),
-        (["solve", "inflatable_arm", "--max-iterations", "0"], "--max-iterations must be a positive integer"),
+        (["solve", "inflatable_arm", "--tolerance", "0"], "--tolerance must be"),
         (["solve", "inflatable_arm", "--spring", "spring_1_up=nan"], "--spring must be a finite number"),
         (["solve", "inflatable_arm", "--set", "stiffness=-1"], "stiffness must be above 0"),  # a parameter, no option
         (["ik", "inflatable_arm", "--target", "nan", "0", "0"], "--target must be an array"),

@@ -91,7 +91,7 @@ def test_bash_completes_robots_and_files(offered: dict[str, set[str]]) -> None:
 
 
 def test_bash_completes_options_and_choices(offered: dict[str, set[str]]) -> None:
-    assert offered["options"] == {"--motors", "--moment", "--method", "--max-iterations", "--muscles"}
+    assert offered["options"] == {"--motors", "--moment", "--method", "--muscles"}
     assert offered["options behind numbers"] == {"--force"}
     assert offered["choices"] == {"newton", "fixed_point"}
     assert offered["choices of another command"] == {"newton", "alternation"}

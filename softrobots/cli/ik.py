@@ -42,7 +42,6 @@ _EXAMPLES = """examples:
 """
 
 _STARTS = 24
-_GAIN = 50.0
 
 
 def add_parser(subparsers: Any) -> None:
@@ -82,7 +81,6 @@ def add_parser(subparsers: Any) -> None:
     help_text = f"largest distance of the tip from a target [m] ({POSITION_TOLERANCE:g}); not for --method paper"
     add_numbers(parser, "--tolerance", "D", help_text)
     parser.add_argument("--starts", type=int, metavar="N", help=f"number of searches for --target [-] ({_STARTS})")
-    add_numbers(parser, "--gain", "K", f"gain of --method paper [1/s] ({_GAIN:g})")
     help_text = "go on from the nearest solution where a waypoint cannot be reached by a continuous motion (an error)"
     parser.add_argument("--allow-jumps", action="store_true", help=help_text)
     add_output(parser, "the solution or trajectory", ROS_FORMS)
@@ -107,9 +105,8 @@ def run(arguments: argparse.Namespace) -> None:
     if path is None:
         _reach(arguments, model, options)
         return
-    gain = _GAIN if arguments.gain is None else arguments.gain
     trajectory = follow_trajectory(
-        model, path.targets, **options, times=path.times, gain=gain, allow_jumps=arguments.allow_jumps, progress="waypoints"
+        model, path.targets, **options, times=path.times, allow_jumps=arguments.allow_jumps, progress="waypoints"
     )
     files = save(arguments, trajectory) + write_plot(arguments, lambda: plot(trajectory))
     print_answer(arguments, trajectory_answer(trajectory), trajectory.summary(None), files)
@@ -140,7 +137,6 @@ def _refuse_contradictions(arguments: argparse.Namespace) -> None:
         "--starts": (arguments.starts is not None and not single, "--target"),
         "--allow-jumps": (arguments.allow_jumps and single, "--waypoints"),
         "--method": (paper and single, "--waypoints, or another method"),
-        "--gain": (arguments.gain is not None and not paper, "--method paper"),
         "--tolerance": (arguments.tolerance is not None and paper, "another method than paper"),
     }
     for option, (wrong, requirement) in given.items():

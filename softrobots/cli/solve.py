@@ -12,18 +12,14 @@ from softrobots.cli.options.robot_argument import add_model, add_motors, motors_
 from softrobots.cli.reports.answers import add_json, print_answer
 from softrobots.cli.reports.robot_answers import equilibrium_answer
 from softrobots.core.checks import finite_array
-from softrobots.core.errors import NeutralEquilibrium
-from softrobots.core.summary import Part, Table, text_of
-from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import TOLERANCE
 from softrobots.statics.elastostatics import METHODS
-from softrobots.statics.equilibrium import Equilibrium, solve_equilibrium
-from softrobots.statics.sensitivity import compliance
+from softrobots.statics.equilibrium import solve_equilibrium
 from softrobots.view.figures.picture import plot
 
 _EXAMPLES = """examples:
   softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --force 0 10 -15
-  softrobots solve inflatable_arm --set stiffness=200 --gravity --compliance --json
+  softrobots solve inflatable_arm --set stiffness=200 --gravity --json
   softrobots solve inflatable_arm --force 0 10 -15 --wrench link_1 0 0 -5 0 0 0 -o sagging.npz
   softrobots solve pcc_arm --motors 0.50 0.53 0.55 0.54 0.51 0.52 --gravity --plot shape.png
   softrobots solve inflatable_arm --motors 0.3 0.6 -0.8 --gravity --environment room.yaml
@@ -52,10 +48,6 @@ def add_parser(subparsers: Any) -> None:
     add_numbers(parser, "--start", "Y", help_text, nargs="+")
     help_text = f"largest residual, relative to the size of the load [-] ({TOLERANCE:g})"
     add_numbers(parser, "--tolerance", "T", help_text, default=TOLERANCE)
-    help_text = "most evaluations [-] (200 for newton, 1000 for fixed_point)"
-    parser.add_argument("--max-iterations", type=int, metavar="N", help=help_text)
-    help_text = "also the motion of the tip per wrench added there, 6 by 6 [m/N, m/(N m); rad/N, rad/(N m)] (left out)"
-    parser.add_argument("--compliance", action="store_true", help=help_text)
     add_output(parser, "the equilibrium")
     add_plot(parser, "the loaded shape")
     add_json(parser)
@@ -75,26 +67,6 @@ def run(arguments: argparse.Namespace) -> None:
         method=arguments.method,
         q_springs0=start,
         tolerance=arguments.tolerance,
-        max_iterations=arguments.max_iterations,
     )
-    answer, parts = equilibrium_answer(equilibrium), equilibrium.summary_parts()
-    if arguments.compliance:
-        parts[-1:] = [*_compliance(model, equilibrium, answer), parts[-1]]
     files = save(arguments, equilibrium) + write_plot(arguments, lambda: plot(equilibrium))
-    print_answer(arguments, answer, text_of(parts, None), files)
-
-
-def _compliance(model: SoftModel, equilibrium: Equilibrium, answer: dict[str, Any]) -> list[Part]:
-    answer["units"]["compliance"] = "m/N, m/(N m); rad/N, rad/(N m)"
-    try:
-        matrix = answer["compliance"] = compliance(model, equilibrium)
-    except NeutralEquilibrium as error:
-        answer["compliance"] = None
-        return [f"compliance  none: {error}"]
-    rows = [(name, *(f"{number:.3e}" for number in row)) for name, row in zip(_MOTIONS, matrix, strict=True)]
-    title = "compliance of the tip: motion [m] and turn [rad] per force [N] and moment [N m]"
-    return [Table([("", *_WRENCH), *rows], right=range(1, 7), title=title)]
-
-
-_MOTIONS = ("x", "y", "z", "about x", "about y", "about z")
-_WRENCH = ("force x", "force y", "force z", "moment x", "moment y", "moment z")
+    print_answer(arguments, equilibrium_answer(equilibrium), equilibrium.summary(None), files)
