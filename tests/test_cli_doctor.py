@@ -57,7 +57,6 @@ def test_doctor_answers_machines(told) -> None:
     assert (answer["ok"], answer["wrong"], answer["softrobots"]) == (True, [], sr.__version__)
     assert {row["name"]: row["version"] for row in answer["packages"]} == {row.name: row.version for row in required_packages()}
     assert list(answer["extras"]) == list(EXTRAS)
-    assert answer["urdf_files"] == [{"file": str(ARM), "up_to_date": True}]
 
 
 def test_the_page_that_doctor_asks_for_is_that_of_its_server(told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
@@ -151,7 +150,7 @@ def test_doctor_tells_of_a_cache_that_does_not_last(told, monkeypatch: pytest.Mo
 
 @pytest.mark.study
 @pytest.mark.usefixtures("one_robot")
-def test_doctor_sees_files_that_differ_and_kinematics_that_do_not_agree(
+def test_doctor_sees_broken_files_and_kinematics_that_do_not_agree(
     told, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     for file in urdf_folder().glob("*.urdf"):
@@ -168,9 +167,7 @@ def test_doctor_sees_files_that_differ_and_kinematics_that_do_not_agree(
     monkeypatch.setattr("softrobots.cli.doctor.ROBOTS", some)  # the page is left out
     status, out, _ = told("doctor")
     assert status == 1
-    assert re.search(r"inflatable_arm\.urdf +differs", out)
     wrong = out[out.index("\nwrong:\n") :]
-    assert "inflatable_arm.urdf is not what xacro generates" in wrong
     assert "pcc_arm.urdf is not well-formed XML" in wrong
     assert re.search(r"inflatable_arm: yourdfpy is within \d\.\de\+?-?\d+ m", wrong)  # it knows no mimic of a mimic
 

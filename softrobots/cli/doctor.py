@@ -1,4 +1,4 @@
-"""`softrobots doctor`: what is installed, whether the shipped files are up to date, and whether the tools agree on them."""
+"""`softrobots doctor`: what is installed, and whether the tools agree on the shipped files."""
 
 from __future__ import annotations
 
@@ -27,11 +27,10 @@ def add_parser(subparsers: Any) -> None:
     """Add the subcommand."""
     parser = subparsers.add_parser(
         "doctor",
-        help="show what is installed, and whether files and tools agree",
+        help="show what is installed, and whether tools agree",
         description="Show which packages are installed and which extras are complete, whether the page of the viewer can be "
-        "served (by a server on loopback that is started and ended), whether the shipped URDF files are what xacro "
-        "generates, and how far yourdfpy's kinematics of them is from Pinocchio's. Exit status 0 if all that is required is "
-        "fine, 1 if not.",
+        "served (by a server on loopback that is started and ended), and how far yourdfpy's kinematics of the shipped URDF "
+        "files is from Pinocchio's. Exit status 0 if all that is required is fine, 1 if not.",
     )
     add_json(parser)
     parser.set_defaults(run=run)
@@ -60,7 +59,6 @@ def run(arguments: argparse.Namespace) -> bool:
     _packages(report)
     if folder is not None and not report.wrong:
         _page(report)
-        _files(folder, report)
         _kinematics(folder, report)
     report.answer.update(wrong=report.wrong, ok=not report.wrong)
     end = ["wrong:", *(f"  {text}" for text in report.wrong)] if report.wrong else ["all well"]
@@ -139,20 +137,6 @@ def _fetch(url: str) -> str:
     except OSError as error:
         return f"{url}: {error}"
     return "" if "meshcat" in text.lower() else f"{url} answers with something else than meshcat's page"
-
-
-def _files(folder: Path, report: _Report) -> None:
-    """Whether the shipped URDF files are those that xacro generates."""
-    from tqdm import tqdm
-
-    rows = report.answer["urdf_files"] = []
-    for name, robot in tqdm(ROBOTS.items(), desc="xacro", unit="file", leave=False, disable=None):
-        file, generated = folder / f"{name}.urdf", robot().urdf().encode("utf-8")
-        rows.append({"file": file, "up_to_date": file.is_file() and file.read_bytes() == generated})
-        if not rows[-1]["up_to_date"]:
-            report.wrong.append(f"{file} is not what xacro generates")
-    cells = [(row["file"].name, "the same" if row["up_to_date"] else "differs") for row in rows]
-    report.add("URDF files, and what xacro generates now", cells)
 
 
 def _kinematics(folder: Path, report: _Report) -> None:
