@@ -776,7 +776,6 @@ DOORWAYS = {
     "view.live.input": ("watched file",),
     "export.meshes": ("STL",),
     "cli.simulate": "tables of numbers, through the same door as tables of measurements",
-    "cli.doctor": "compares a file with what is generated, byte for byte",
     "studies.shared.recorded_run": "a page of the checkout",
     "studies.measured.comparison": "tables of the checkout",
     "studies.measured.recorded_arm": "runs recorded in the checkout",
