@@ -15,7 +15,7 @@ import softrobots as sr
 from softrobots.core.checks import FloatArray
 from softrobots.dynamics import simulation
 from softrobots.dynamics.equations import EquationsOfMotion
-from softrobots.dynamics.time_grid import merged_times
+from softrobots.dynamics.time_grid import first_grid, merged_times
 from tests.support.laws import law
 from tests.support.pendulums import LENGTH, MASS, double_pendulum, pendulum, tip_of
 
@@ -195,6 +195,21 @@ def test_times_that_are_one_are_left_out_from_the_last_group_on(groups: list[lis
     assert np.all(np.diff(merged) > apart)
     within = [time for time in groups[0] if apart < time < 2.0 - apart]
     assert not within or min(within) in merged
+
+
+@given(
+    breaks=st.lists(st.floats(0.0, 2.0), max_size=8).map(lambda times: np.sort(np.array(times))),
+    count=st.integers(1, 300),
+    order=st.sampled_from([2, 4]),
+)
+def test_first_steps_are_short_and_end_at_breaks_or_rows(breaks: FloatArray, count: int, order: int) -> None:
+    rows = np.linspace(0.0, 2.0, count + 1)
+    grid = first_grid(rows, [breaks], order)
+    lengths, ends = np.diff(grid), breaks[(breaks > 2e-9) & (breaks < 2.0 - 2e-9)] if order == 2 else rows
+    assert (grid[0], grid[-1]) == (0.0, 2.0)
+    assert np.all(lengths > 0.0)
+    assert np.all(lengths <= (0.01 if order == 2 else 0.02) * (1.0 + 1e-9))
+    assert np.isin(ends[np.diff(ends, prepend=-1.0) > 2e-9], grid).all()
 
 
 def test_a_short_pulse_in_a_long_table_is_not_passed_over() -> None:

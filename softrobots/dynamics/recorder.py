@@ -30,7 +30,6 @@ class Recorder:
         self._forces = rule.load.tip_forces(rows) if rule.load.constant else np.zeros((len(rows), 3))
         self.rows = 0
         """Number of rows so far."""
-        self._most_rows = 0
         self._memory = start.memory
         self.times, self.tips = [start.time], [self.tip(start.x)]
         """Times of the steps, and positions of the tip then, shape (3,) [m]."""
@@ -46,7 +45,7 @@ class Recorder:
         return np.array(frame_placement(model, q, model.tip).translation)
 
     def add(self, step: Step) -> int:
-        """Take a step; return how many rows there are more than ever before."""
+        """Take a step; return how many more rows there are."""
         equations, middle, h = self._equations, step.middle, step.length
         dissipated, load_work, motor_work = self._works[-1]
         dissipated += h * step.friction_power
@@ -77,8 +76,7 @@ class Recorder:
         self._works.append((dissipated, load_work, motor_work))
         self.tips.append(tip)
         self.times.append(step.end.time)
-        self.state, self.rows, more = step.end, last, max(last - self._most_rows, 0)
-        self._most_rows += more
+        more, self.state, self.rows = last - self.rows, step.end, last
         return more
 
     def kick(self, change: FloatArray) -> None:
@@ -87,17 +85,6 @@ class Recorder:
         work = self._equations.energies(after.x, after.rates)[0] - self._equations.energies(after.x, self.state.rates)[0]
         dissipated, load_work, motor_work = self._works[-1]
         self.state, self._works[-1] = after, (dissipated, load_work, motor_work + work)
-
-    def mark(self) -> tuple[State, int, int]:
-        """What `reset` needs to return to here."""
-        return self.state, self.rows, len(self._middles)
-
-    def reset(self, mark: tuple[State, int, int]) -> None:
-        """Forget the steps since a mark."""
-        self.state, self.rows, steps = mark
-        del self.times[steps + 1 :], self.tips[steps + 1 :], self._works[steps + 1 :]
-        del self._middles[steps:], self._exerted[steps:]
-        self.rule.forget()
 
     def motion(self, **facts: Any) -> Motion:
         """Return the motion of the rows so far, with more of its fields."""

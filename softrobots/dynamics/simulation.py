@@ -14,30 +14,27 @@ from softrobots.core.errors import NotConverged, ParameterError
 from softrobots.core.progress import with_progress
 from softrobots.dynamics.damping import damping_matrix
 from softrobots.dynamics.equations import EquationsOfMotion
-from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import MidpointRule
 from softrobots.dynamics.motion import Motion, MotionState
 from softrobots.dynamics.motor_torque import MOTORS, MotorTorque
 from softrobots.dynamics.recorder import Recorder
 from softrobots.dynamics.starting import first_kick, first_state
 from softrobots.dynamics.step_control import (
+    RULES,
+    STALLED,
     NoStep,
-    choose,
     error_share,
     follow,
     halved,
     order_of_steps,
-    rule_of_order,
     stopped_at,
     tip_distances,
 )
-from softrobots.dynamics.time_grid import SAME_TIME, grid_of_rows, grid_with_stops, merged_times, steps_and_rows
+from softrobots.dynamics.time_grid import SAME_TIME, first_grid, grid_with_stops, merged_times, steps_and_rows
 from softrobots.dynamics.time_inputs import MotorPath, TimeLoad
 from softrobots.model.soft_model import SoftModel, check_model
 from softrobots.statics.equilibrium import Equilibrium
 from softrobots.statics.loads import Load
-
-_STALLED = 3  # runs in which the error of the tip is to halve at least once
 
 MOST_STEPS = 400_000
 """Most steps of one run that is refined for a tolerance."""
@@ -126,41 +123,30 @@ def simulate(
         def new_run() -> Recorder:
             """A run from the first state, whose velocities take those with which prescribed motors begin."""
             controller = None if drive is None else MotorTorque(model, torque, sample_time)
-            rule = rule_of_order(scheme)(equations, path, load, controller)
+            rule = RULES[scheme](equations, path, load, controller)
             change = first_kick(path, first.rates[: model.n_motors])
             return Recorder(rule, first if change is None else rule.kicked(first, change), rows)
 
         breaks = path.kick_times, path.breaks, load.breaks
-        stops = merged_times(SAME_TIME * end, end, *breaks) if h is None else grid_with_stops(end, h, *breaks)
+        grid = merged_times(SAME_TIME * end, end, *breaks) if h is None else grid_with_stops(end, h, *breaks)
         if drive is not None:
-            stops = drive.with_samples(stops)
-        if h is None and scheme == GaussRule.order:
-            stops = grid_of_rows(rows)
+            grid = drive.with_samples(grid)
         if h is not None:
-            return _fixed(new_run(), stops, beta, progress)
-        return _controlled(new_run, stops, largest, beta, progress)
+            return _within(None, new_run, grid, beta, progress)
+        return _within(largest, new_run, first_grid(rows, [grid], scheme), beta, progress)
 
 
-def _fixed(run: Recorder, grid: FloatArray, damping_time: float | None, progress: bool | str) -> Motion:
-    """Motion with given steps."""
-    try:
-        _take(run, follow(run, grid), {"damping_time": damping_time}, progress, "motion")
-        return run.motion(damping_time=damping_time)
-    except KeyboardInterrupt:
-        return run.motion(damping_time=damping_time, interrupted=True)
-
-
-def _controlled(
-    new_run: Callable[[], Recorder], stops: FloatArray, tolerance: float, damping_time: float | None, progress: bool | str
+def _within(
+    tolerance: float | None, new_run: Callable[[], Recorder], grid: FloatArray, damping_time: float | None, progress: bool | str
 ) -> Motion:
-    """Motion with steps for a tolerance of the tip, that end at `stops`."""
+    """Motion with the steps of a grid, and with shorter ones until the tip is within a tolerance [m]; None: any."""
     facts: dict[str, Any] = {"damping_time": damping_time, "tolerance": tolerance, "tip_error": None}
     run, history, last = new_run(), [math.inf], math.inf
     order = run.rule.order
     try:
-        first = choose(run, stops, tolerance) if order == MidpointRule.order else follow(run, stops)
-        _take(run, first, facts, progress, "motion")
-        while True:
+        knees = tolerance is not None and order == MidpointRule.order
+        _take(run, follow(run, grid, to_knees=knees), facts, progress, "motion")
+        while tolerance is not None:
             finer = new_run()
             grid = halved(np.array(run.times))
             _take(finer, follow(finer, grid), facts | {"tip_error": None}, progress, f"motion, {len(grid) - 1} steps")
@@ -171,7 +157,7 @@ def _controlled(
             facts["tip_error"] = history[-1]
             if history[-1] <= tolerance:
                 return finer.motion(**facts)
-            if len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]:
+            if len(history) > STALLED and history[-1] > 0.5 * history[-1 - STALLED]:
                 why = "halving the steps brings the runs no closer, as in chaotic motion"
             elif (needed := len(finer.times) * 2 ** math.ceil(math.log2(history[-1] / tolerance) / order)) > MOST_STEPS:
                 why = f"about {needed} would be needed, {MOST_STEPS} are the most"
@@ -187,6 +173,7 @@ def _controlled(
                 residual=history[-1],
                 iterations=len(history),
             )
+        return run.motion(**facts)
     except KeyboardInterrupt:
         return run.motion(**facts, interrupted=True)
 

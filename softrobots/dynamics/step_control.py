@@ -1,12 +1,7 @@
 r"""Lengths of the steps of a simulation: given, or chosen so that the tip stays within a tolerance over the whole run.
 
-*The first grid.* Midpoint steps turn a vibration of frequency :math:`\omega` too slowly, by the phase
-:math:`\omega^3 h^2 t / 12` over a time t (Hairer, Lubich and Wanner, Geometric Numerical Integration, 2006, section I.1.4). On
-the path p of the tip that is a drift of :math:`h^2 |p'''| / 12` per time. Steps come in blocks of equal length, after which it
-is measured from third differences; a block that drifts too fast is taken again with shorter steps. The path is smoothed by (1,
-2, 1) / 4 first, which removes what alternates from step to step: vibrations far above the frequency of the steps, which move
-the tip by no more than their small amplitude. Steps end where loads jump or motors stop, and where a spring is at a knee of
-its law.
+*The first grid.* Steps of second order are 200 or more, of equal length between the times where loads jump or motors stop, and
+also end where a spring is at a knee of its law; those of fourth order are 100 or more, and end at the rows.
 
 *The certificate.* The run is repeated with every step halved, again and again. Where halving shrinks the distance between the
 tip paths of successive runs by the factor r, the finer one has the distance over r - 1 as its error: a third for a smooth
@@ -31,16 +26,14 @@ from softrobots.dynamics.midpoint import MidpointRule, Step
 from softrobots.dynamics.recorder import Recorder
 from softrobots.model.soft_model import SoftModel
 
-_BLOCK = 40  # steps between two measurements of the drift
-_LONGEST = 1 / 80  # of the duration: no first step is longer
-_SHORTEST = 1 / 50_000  # of the duration: none is chosen shorter
-_QUIET = 2e-5  # of the tolerance: a block with less drift than this in each step is fine enough
-_COARSER = 10.0  # error of the first run over the tolerance, which that of a quarter of its steps meets
-_FADING = 0.9  # of the measured drift, from block to block
 _HALVINGS = 30  # of a step that fails
 _SMOOTH = {2: 4.0, 4: 8.0}  # largest r that is believed, for each order
 _LEAST = 1e-300  # distance that two runs have at least [m]
 
+RULES: dict[int, type[MidpointRule]] = {2: MidpointRule, 4: GaussRule}
+"""The scheme of each order."""
+STALLED = 5
+"""Runs in which the error of the tip is to halve at least once."""
 SAFETY = 1.2
 """Error that is stated over the one that is estimated from halved steps [-]."""
 
@@ -55,53 +48,14 @@ def stopped_at(time: float, duration: float, error: Exception) -> str:
     return f"the motion ends at t = {time:.6g} s of {duration:.6g} s: {why}"
 
 
-def follow(recorder: Recorder, grid: FloatArray) -> Iterator[int]:
-    """Step through a grid of times; yield once for each row of the output.
+def follow(recorder: Recorder, grid: FloatArray, *, to_knees: bool = False) -> Iterator[int]:
+    """Step through a grid of times, on demand also to where a spring is at a knee of its law; yield once for each row.
 
     Raises:
         NoStep: If no step succeeds.
     """
     for time in grid[1:].tolist():
-        yield from _advance(recorder, time)
-
-
-def choose(recorder: Recorder, breaks: FloatArray, tolerance: float) -> Iterator[int]:
-    """Step to the last row with steps for a tolerance of the tip [m], see the module; yield once for each row.
-
-    Args:
-        recorder: The run, at its start.
-        breaks: Times at which inputs have a jump or a kink, ascending, shape (n,) [s].
-        tolerance: Largest drift of the tip over the whole run [m].
-
-    Raises:
-        NoStep: If no step succeeds.
-    """
-    duration, now = recorder.duration, recorder.state.time
-    h, drift = _LONGEST * duration / 2.0, 0.0
-    for stop in [*(time for time in breaks.tolist() if 0.0 < time < duration), duration]:
-        recorder.rule.forget()
-        while now < stop:
-            mark, steps = recorder.mark(), max(1, math.ceil((stop - now) / h - 1e-9))
-            if steps > _BLOCK:
-                steps = _BLOCK * math.ceil(steps / _BLOCK)
-            length, taken = (stop - now) / steps, min(steps, _BLOCK)
-            for number in range(1, taken + 1):
-                end = stop if number == steps else now + number * length
-                yield from _advance(recorder, end, to_knees=True)
-                if recorder.state.time < end:  # at a knee
-                    break
-            measured = _drift(recorder)
-            allowed = _COARSER * tolerance * max(length / duration, _QUIET)
-            if measured is not None and measured > 2.0 * allowed and length > _SHORTEST * duration:
-                h = length * max(0.125, 0.5 ** math.ceil(0.5 * math.log2(measured / allowed)))
-                if taken == _BLOCK:
-                    recorder.reset(mark)
-                    continue
-            elif measured is not None:
-                drift = max(_FADING * drift, measured / length**3)
-                if 8.0 * drift * length**3 < allowed and length > 0.5 * h:
-                    h = min(2.0 * h, _LONGEST * duration)
-            now = recorder.state.time
+        yield from _advance(recorder, time, to_knees)
 
 
 def halved(grid: FloatArray) -> FloatArray:
@@ -126,18 +80,13 @@ def order_of_steps(order: Any, time_step: float | None, model: SoftModel, still:
     if order is None:
         smooth = still and model.structure.friction is None and len(model.springs.beyond_plateaus(model.rest)) == 0
         return GaussRule.order if smooth and time_step is None else MidpointRule.order
-    if isinstance(order, bool) or np.ndim(order) or order not in (GaussRule.order, MidpointRule.order):
+    if isinstance(order, bool) or np.ndim(order) or order not in RULES:
         raise ParameterError("order", order, "2, 4 or None")
     if order == GaussRule.order and model.structure.friction is not None:
         raise ParameterError("order", order, "2 or None of a robot with dry friction")
     if order == GaussRule.order and not still:
         raise ParameterError("order", order, "2 or None where motors or loads change over time")
     return int(order)
-
-
-def rule_of_order(order: int) -> type[MidpointRule]:
-    """Return the scheme of an order, 2 or 4."""
-    return GaussRule if order == GaussRule.order else MidpointRule
 
 
 def error_share(before: float, now: float, order: int) -> float:
@@ -158,8 +107,8 @@ def tip_distances(coarse: Recorder, fine: Recorder) -> FloatArray:
     return np.asarray(np.linalg.norm(np.array(coarse.tips) - np.array(fine.tips)[places], axis=1))
 
 
-def _advance(recorder: Recorder, end: float, *, to_knees: bool = False) -> Iterator[int]:
-    """Take a step to a time, or several shorter ones if it fails; or to the first knee before that time."""
+def _advance(recorder: Recorder, end: float, to_knees: bool) -> Iterator[int]:
+    """Take a step to a time, or several shorter ones if it fails, or to knees before that time."""
     targets = [end]
     shortest = max((end - recorder.state.time) * 0.5**_HALVINGS, 4.0 * math.ulp(end))  # down to where times differ
     while targets:
@@ -175,7 +124,7 @@ def _advance(recorder: Recorder, end: float, *, to_knees: bool = False) -> Itera
                 f"no step from t = {now:.6g} s succeeds, down to a length of {targets[-1] - now:.3g} s" + _range_end(recorder)
             )
         elif knee is not None:
-            targets = [knee]
+            targets.append(knee)
         else:
             recorder.rule.forget()
             targets.append(0.5 * (recorder.state.time + targets[-1]))
@@ -205,21 +154,3 @@ def _first_knee(recorder: Recorder, step: Step) -> float | None:
             times.append(high)
     first = min(times)
     return first if first < step.end.time - 0.01 * step.length else None
-
-
-def _drift(recorder: Recorder) -> float | None:
-    """Drift of the tip in each of the last steps [m], from third differences; None if too few are equally long."""
-    lengths = np.diff(recorder.times[-_BLOCK - 1 :])[::-1]
-    uneven = np.flatnonzero(np.abs(lengths - lengths[0]) > 1e-6 * lengths[0])
-    stride = int(uneven[0] if len(uneven) else len(lengths)) // 5
-    if stride == 0:
-        return None
-    tips = np.array(recorder.tips[-5 * stride - 1 :])
-    smoothed = 0.25 * (tips[: -2 * stride] + 2.0 * tips[stride:-stride] + tips[2 * stride :])
-    thirds = (
-        smoothed[3 * stride :]
-        - 3.0 * smoothed[2 * stride : -stride]
-        + 3.0 * smoothed[stride : -2 * stride]
-        - smoothed[: -3 * stride]
-    )
-    return float(np.linalg.norm(thirds, axis=1).max()) / (12.0 * stride**3)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterable
 from typing import Any
 
 import numpy as np
@@ -16,7 +17,7 @@ TIP_TOLERANCE = 5e-4
 SAME_TIME = 1e-9
 """Share of a duration within which times are the same one: jumps are found by bisection, to a rounding."""
 
-_COARSEST = 100  # steps at least, of the first of the runs of fourth order
+_COARSEST = {2: 200, 4: 100}  # steps at least, of the first of the runs that are compared, for each order
 _ROWS = 200  # of a motion, if no output step is given
 _MOST_TIMES = 10_000_000  # steps, rows or samples of a motion, for which memory suffices
 
@@ -39,10 +40,13 @@ def time_grid(end: float, step: float) -> FloatArray:
     return grid
 
 
-def grid_of_rows(rows: FloatArray) -> FloatArray:
-    """Return the times of rows, with each interval divided evenly if they are few, shape (n,) [s]."""
-    parts = math.ceil(_COARSEST / (len(rows) - 1))
-    return np.append((rows[:-1, None] + np.diff(rows)[:, None] * np.arange(parts) / parts).ravel(), rows[-1])
+def first_grid(rows: FloatArray, breaks: Iterable[FloatArray], order: int) -> FloatArray:
+    """Return the steps of the first of the runs that are compared, ending at breaks, or of order 4 at rows, shape (n,) [s]."""
+    end = float(rows[-1])
+    stops = rows if order == 4 else merged_times(SAME_TIME * end, end, *breaks)
+    parts = np.ceil(np.diff(stops) / end * _COARSEST[order] - 1e-9).astype(int)
+    pieces = zip(stops[:-1], stops[1:], parts, strict=True)
+    return np.append(np.concatenate([np.linspace(one, other, count + 1)[:-1] for one, other, count in pieces]), end)
 
 
 def grid_with_stops(end: float, step: float, *stops: FloatArray) -> FloatArray:

@@ -20,14 +20,14 @@ from softrobots.compiled.run.motion_course import Course, SpringKicks
 from softrobots.compiled.run.motion_damping import MotionDamping
 from softrobots.compiled.run.motion_replay import replay
 from softrobots.compiled.run.motion_results import CompiledMotion, StepEnd, check_batch, check_motion
-from softrobots.compiled.run.motion_runs import StepsTaken, first_grid, halve_to_tolerance, take_batch, take_one
+from softrobots.compiled.run.motion_runs import StepsTaken, halve_to_tolerance, take_batch, take_one
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray, finite_array, non_negative_number, positive_integer, positive_number, read_only
 from softrobots.core.errors import NotConverged
 from softrobots.dynamics.equations import EquationsOfMotion
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.step_control import order_of_steps
-from softrobots.dynamics.time_grid import grid_with_stops, steps_and_rows
+from softrobots.dynamics.time_grid import first_grid, grid_with_stops, steps_and_rows
 from softrobots.dynamics.time_inputs import MOST_KINKS, MotorPath, TimeLoad
 from softrobots.model.friction_coordinates import check_frictionless
 

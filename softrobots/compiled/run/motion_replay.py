@@ -16,7 +16,7 @@ from softrobots.dynamics.gauss import GaussRule
 from softrobots.dynamics.midpoint import State, Step
 from softrobots.dynamics.motion import Motion
 from softrobots.dynamics.recorder import Recorder
-from softrobots.dynamics.step_control import NoStep, follow, rule_of_order
+from softrobots.dynamics.step_control import RULES, NoStep, follow
 
 _WHOLE = 1e-9  # rad or m by which one midpoint step may seem to miss its end; one that was halved does so by h^2
 
@@ -50,7 +50,7 @@ def replay(
     m, k, count = equations.n_motors, equations.n - equations.n_motors, 2 * len(taken.grid) - 1
     motors, states = np.broadcast_to(motors_of_steps(course.path, taken.grid), (count, m)), taken.rows[0]
 
-    recorder = Recorder(rule_of_order(order)(equations, course.path, course.load), start, rows)
+    recorder = Recorder(RULES[order](equations, course.path, course.load), start, rows)
     for step, end in enumerate(taken.grid[1:].tolist()):
         before = recorder.state
         h, middle_time = end - before.time, 0.5 * (before.time + end)

@@ -17,13 +17,9 @@ from softrobots.compiled.run.motion_course import Course, SpringKicks, forces_of
 from softrobots.compiled.statuses import Status
 from softrobots.core.checks import FloatArray
 from softrobots.core.progress import with_progress
-from softrobots.dynamics.gauss import GaussRule
-from softrobots.dynamics.step_control import error_share, halved
-from softrobots.dynamics.time_grid import SAME_TIME, grid_of_rows, merged_times
+from softrobots.dynamics.step_control import STALLED, error_share, halved
 
-_FIRST_STEPS = 400  # of the first of the runs that are compared
 _PARTS_A_STEP = 4  # on average, of a run that is compared: one with shorter steps is cheaper than more
-_STALLED = 4  # runs in which the error of the tip is to halve at least once
 _CHUNK = 2_000  # steps between two looks for Ctrl-C
 _CASE_STEPS = 10_000_000  # steps times cases between two looks for Ctrl-C, a second or so
 _SAMPLES = 2_000_000  # of motor positions in memory
@@ -57,16 +53,6 @@ class StepsTaken:
     """Time [s] before which a function of the one case failed, and its error."""
 
 
-def first_grid(rows: FloatArray, breaks: Sequence[FloatArray], order: int) -> FloatArray:
-    """Return the steps of the first of the runs that are compared, which end at `breaks`, or at the rows, shape (n,) [s]."""
-    if order == GaussRule.order:
-        return grid_of_rows(rows)
-    end = float(rows[-1])
-    stops = merged_times(SAME_TIME * end, end, *breaks)
-    ends = zip(stops[:-1], stops[1:], np.ceil(np.diff(stops) / end * _FIRST_STEPS).astype(int) + 1, strict=True)
-    return np.append(np.concatenate([np.linspace(one, other, count)[:-1] for one, other, count in ends]), end)
-
-
 def halve_to_tolerance(
     take: Callable[[FloatArray], StepsTaken], grid: FloatArray, tolerance: float, order: int, bad: Any = False
 ) -> StepsTaken:
@@ -84,14 +70,14 @@ def halve_to_tolerance(
         errors = np.linalg.norm(now.rows[..., -3:] - before.rows[..., -3:], axis=2).max(axis=1, initial=0.0)
         errors = np.where(before.status == Status.CERTIFIED, errors, np.inf)
         counts = (now.status == Status.CERTIFIED) & ~np.asarray(bad)
-        if not np.any(counts) and not np.all(bad) and len(history) <= _STALLED and 2 * len(grid) <= MOST_STEPS:
+        if not np.any(counts) and not np.all(bad) and len(history) <= STALLED and 2 * len(grid) <= MOST_STEPS:
             history, before = [*history, math.inf], now  # long steps may fail where shorter ones do not
             continue
         furthest = float(errors[counts].max(initial=0.0))
         errors *= error_share(last, furthest, order)
         now, last = replace(now, errors=np.where(counts, errors, np.inf)), furthest
         history.append(float(errors[counts].max(initial=0.0)))
-        stalled = len(history) > _STALLED and history[-1] > 0.5 * history[-1 - _STALLED]
+        stalled = len(history) > STALLED and history[-1] > 0.5 * history[-1 - STALLED]
         if history[-1] <= tolerance or stalled or 2 * len(grid) > MOST_STEPS:
             return replace(now, is_within=history[-1] <= tolerance)
         before = now
