@@ -186,19 +186,14 @@ def _start(arguments: argparse.Namespace, model: SoftModel, motors: Any, duratio
         if arguments.start in (None, "relaxed"):
             return None
         if arguments.start != "equilibrium":
-            return _saved_start(arguments.start)
+            found = load_result(arguments.start)
+            required = f"relaxed, equilibrium, or a saved equilibrium or motion, not a {type(found).__name__}"
+            if not isinstance(found, Equilibrium | Motion):
+                raise ParameterError("--start", arguments.start, required)
+            return found
     wrenches = TimeLoad(model, gust, load.wrenches, duration)(0.0)
     first = Load(wrenches, load.gravity)
     if arguments.release is not None:
         first = first.plus(model.tip, np.append(finite_array("--release", arguments.release, (3,), "N"), np.zeros(3)))
     begin = MotorPath(model, motors, duration)(0.0)
     return solve_equilibrium(model, begin, wrench=dict(first.wrenches), gravity=first.gravity)
-
-
-def _saved_start(file: str) -> Equilibrium | Motion:
-    """The equilibrium or motion of a file."""
-    found = load_result(file)
-    if not isinstance(found, Equilibrium | Motion):
-        kind = type(found).__name__
-        raise ParameterError("--start", file, f"relaxed, equilibrium, or a saved equilibrium or motion, not a {kind}")
-    return found

@@ -133,7 +133,6 @@ class MidpointRule:
         self._at = self.free if torque else slice(m, n)  # the same, quickly
         self._block: Any = np.ix_(self.free, self.free) if torque else (self._at, self._at)
         self._damping = equations.damping[self._block]
-        self._known: tuple[float, FloatArray] | None = None
         self._has_knees = torque is not None or equations.has_slack_tendons or equations.friction is not None
         self.forget()
 
@@ -159,7 +158,7 @@ class MidpointRule:
         m, n = equations.n_motors, equations.n
         h, middle_time = end_time - start.time, 0.5 * (start.time + end_time)
         wrenches = self.load(middle_time)
-        before, middle, after = self._path(start.time), self.path(middle_time), self.path(end_time)
+        before, middle, after = (self.path(time) for time in (start.time, middle_time, end_time))
         x, rates, accelerations = np.zeros(n), np.zeros(n), np.zeros(n)
         x[:m], rates[:m], accelerations[:m] = middle, (after - before) / h, (after - 2.0 * middle + before) * (4.0 / (h * h))
         y0, v0 = start.x[free], start.rates[free]
@@ -207,7 +206,6 @@ class MidpointRule:
         ends[:m], end_rates[:m] = after, rates[:m] + 0.5 * h * accelerations[:m]
         ends[free], end_rates[free] = y0 + h * v0 + 0.5 * h * h * a, v0 + h * a
         self._past = [*self._past[-1:], (middle_time, a)]
-        self._known = end_time, after
         middle_state = State(middle_time, x, rates)
         memory, lost = equations.end_step(x, rates, ends)
         if torque is not None:
@@ -221,10 +219,6 @@ class MidpointRule:
         if self.torque is not None:
             residual[: self.torque.count] -= self.torque.exerted(time, x, rates)
         return residual
-
-    def _path(self, time: float) -> FloatArray:
-        """Actuators at a time, which may be the end of the last step."""
-        return self._known[1] if self._known is not None and self._known[0] == time else self.path(time)
 
     def _predicted(self, time: float, count: int) -> FloatArray:
         """Acceleration extrapolated from the last two steps."""

@@ -49,13 +49,30 @@ def stopped_at(time: float, duration: float, error: Exception) -> str:
 
 
 def follow(recorder: Recorder, grid: FloatArray, *, to_knees: bool = False) -> Iterator[int]:
-    """Step through a grid of times, on demand also to where a spring is at a knee of its law; yield once for each row.
+    """Step through a grid of times, on demand to the knees of springs, too; yield once for each row. What fails is halved.
 
     Raises:
         NoStep: If no step succeeds.
     """
-    for time in grid[1:].tolist():
-        yield from _advance(recorder, time, to_knees)
+    for end in grid[1:].tolist():
+        targets = [end]
+        shortest = max((end - recorder.state.time) * 0.5**_HALVINGS, 4.0 * math.ulp(end))  # down to where times differ
+        while targets:
+            step = recorder.rule.step(recorder.state, targets[-1])
+            knee = _first_knee(recorder, step) if to_knees and step is not None else None
+            if step is not None and knee is None:
+                yield from range(recorder.add(step))
+                targets.pop()
+                if step.end.time in recorder.rule.path.kicks and step.end.time < recorder.duration:
+                    recorder.kick(recorder.rule.path.kicks[step.end.time])
+            elif targets[-1] - (now := recorder.state.time) <= shortest:
+                length = targets[-1] - now
+                raise NoStep(f"no step from t = {now:.6g} s succeeds, down to a length of {length:.3g} s{_range_end(recorder)}")
+            elif knee is not None:
+                targets.append(knee)
+            else:
+                recorder.rule.forget()
+                targets.append(0.5 * (recorder.state.time + targets[-1]))
 
 
 def halved(grid: FloatArray) -> FloatArray:
@@ -99,35 +116,6 @@ def error_share(before: float, now: float, order: int) -> float:
     """
     shrinking = before / max(now, _LEAST) if math.isfinite(before) else 2.0
     return SAFETY / (min(max(shrinking, 2.0), _SMOOTH[order]) - 1.0)
-
-
-def tip_distances(coarse: Recorder, fine: Recorder) -> FloatArray:
-    """Distance of the tips of two runs at the steps of the coarser one, shape (n,) [m]."""
-    places = np.searchsorted(fine.times, coarse.times)
-    return np.asarray(np.linalg.norm(np.array(coarse.tips) - np.array(fine.tips)[places], axis=1))
-
-
-def _advance(recorder: Recorder, end: float, to_knees: bool) -> Iterator[int]:
-    """Take a step to a time, or several shorter ones if it fails, or to knees before that time."""
-    targets = [end]
-    shortest = max((end - recorder.state.time) * 0.5**_HALVINGS, 4.0 * math.ulp(end))  # down to where times differ
-    while targets:
-        step = recorder.rule.step(recorder.state, targets[-1])
-        knee = _first_knee(recorder, step) if to_knees and step is not None else None
-        if step is not None and knee is None:
-            yield from range(recorder.add(step))
-            targets.pop()
-            if step.end.time in recorder.rule.path.kicks and step.end.time < recorder.duration:
-                recorder.kick(recorder.rule.path.kicks[step.end.time])
-        elif targets[-1] - (now := recorder.state.time) <= shortest:
-            raise NoStep(
-                f"no step from t = {now:.6g} s succeeds, down to a length of {targets[-1] - now:.3g} s" + _range_end(recorder)
-            )
-        elif knee is not None:
-            targets.append(knee)
-        else:
-            recorder.rule.forget()
-            targets.append(0.5 * (recorder.state.time + targets[-1]))
 
 
 def _range_end(recorder: Recorder) -> str:
