@@ -110,7 +110,7 @@ def check(robot: XacroRobot, random: np.random.Generator, count: int) -> None:
         values = present + share * np.where(present == 0.0, 0.1, present * random.uniform(-1.0, 1.0, len(fields)))
         other = changed(robot, fields, values.tolist())
         assert variants.robot(values) == other
-        assert variants.urdf(values) == fresh(other)
+        assert variants.robot(values).urdf() == fresh(other)
 
 
 @pytest.mark.study
@@ -145,7 +145,7 @@ def test_xacro_runs_again_only_where_a_comparison_comes_out_otherwise(expansions
     variants = Variants(robot, [("link_lengths", 0), ("stiffness", 0)])
     shapes = []
     for length in (0.3, 0.15, 0.31, 0.14, 0.29, 0.16):
-        text = variants.urdf([length, 1e3 * length])
+        text = variants.robot([length, 1e3 * length]).urdf()
         assert text == fresh(dataclasses.replace(robot, link_lengths=(length,), stiffness=1e3 * length))
         shapes.append(text.count("<collision>"))
     assert shapes == [1, 0] * 3
@@ -191,7 +191,7 @@ def test_what_a_robot_refuses_is_refused(expansions: list[str]) -> None:
         Variants(robot, [("stiffness", 0), ("stiffness", 0)])
     light = sr.TendonArm(elastic_sections=1)
     with pytest.raises(sr.DescriptionError, match="too light to cut"):  # only xacro knows
-        Variants(light, [("linear_density", 0)]).urdf([1e-5])
+        Variants(light, [("linear_density", 0)]).robot([1e-5]).urdf()
 
 
 def test_threads_share_variants() -> None:
@@ -199,7 +199,7 @@ def test_threads_share_variants() -> None:
     variants = Variants(robot, [("stiffness", 0), ("base_mass", None)])
     values = [(100.0 + place, 1.0 + place) for place in range(16)]
     with ThreadPoolExecutor(4) as pool:
-        texts = list(pool.map(variants.urdf, values))
+        texts = list(pool.map(lambda row: variants.robot(row).urdf(), values))
     template = fresh(changed(robot, [("stiffness", 0), ("base_mass", None)], (4321.125, 8765.0625)))
     assert texts[3] == fresh(changed(robot, [("stiffness", 0), ("base_mass", None)], values[3]))
     assert len(set(texts)) == 16
@@ -274,7 +274,7 @@ def test_every_expression_is_followed_or_evaluated_anew(
     robot = calculator(tmp_path, expressions)
     variants = Variants(robot(), [("single", None), ("pair", 0)])
     for single, first in (*rows, rows[0], (rows[0][0] + 1e-12, rows[0][1])):
-        assert variants.urdf([single, first]) == fresh(robot(single=single, pair=(first, 2.0)))
+        assert variants.robot([single, first]).urdf() == fresh(robot(single=single, pair=(first, 2.0)))
 
 
 def test_expressions_are_followed_without_xacro(tmp_path: Path, expansions: list[str]) -> None:
@@ -282,7 +282,7 @@ def test_expressions_are_followed_without_xacro(tmp_path: Path, expansions: list
     variants = Variants(robot(), [("single", None), ("pair", 0)])
     for change in (0.0, 1e-3, 1e-12):
         expected = fresh(robot(single=1.5 + change, pair=(1.25 - change, 2.0)))
-        assert variants.urdf([1.5 + change, 1.25 - change]) == expected
+        assert variants.robot([1.5 + change, 1.25 - change]).urdf() == expected
     assert len(expansions) == 1
 
 
@@ -301,7 +301,7 @@ def test_arguments_may_be_computed_from_fields(tmp_path: Path, expansions: list[
     for kind, count in ((Doubled, 1), (Rooted, 1)):
         variants = Variants(kind(), [("single", None)])
         for single in (1.5, 2.5, 3.5):
-            assert variants.urdf([single]) == fresh(kind(single=single))
+            assert variants.robot([single]).urdf() == fresh(kind(single=single))
         assert len(expansions) == count
 
 
@@ -309,4 +309,4 @@ def test_text_that_takes_a_number_apart_is_left_to_xacro(tmp_path: Path) -> None
     robot = calculator(tmp_path, ["str(a)[:2]", "$(arg single) ** 2"])
     variants = Variants(robot(), [("single", None)])
     for single in (1.5, -2.5):
-        assert variants.urdf([single]) == fresh(robot(single=single))
+        assert variants.robot([single]).urdf() == fresh(robot(single=single))

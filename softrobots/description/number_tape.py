@@ -15,8 +15,12 @@ import math
 import operator
 import re
 from collections.abc import Callable, Sequence
-from functools import partial
+from functools import partial, reduce
 from typing import Any
+
+import numpy as np
+
+from softrobots.core.checks import FloatArray
 
 _MARK = re.compile("\ue000([0-9]+)\ue001")  # private characters, which XML allows and no robot has
 
@@ -66,8 +70,8 @@ class Tape:
         return TracedNumber(self, place, value) if type(value) is float else value
 
     def keep(self, *texts: str) -> bool:
-        """Keep texts into which traced numbers were written; return whether all their marks are whole."""
-        parts = [_MARK.split(text) for text in texts]
+        """Keep texts with the marks of traced numbers, the first as `marked`; return whether all marks are whole."""
+        self.marked, parts = texts[0], [_MARK.split(text) for text in texts]
         self._texts = [(part, [int(place) for place in part[1::2]]) for part in parts]
         return not any(sign in piece for part in parts for piece in part[::2] for sign in "\ue000\ue001")
 
@@ -90,6 +94,31 @@ class Tape:
             filled[1::2] = [digits[place] for place in places]
             texts.append("".join(filled))
         return texts
+
+    def read_many(self, numbers: FloatArray) -> tuple[Any, Callable[[str], FloatArray]]:
+        """Evaluate the tape for rows of other numbers, shape (N, n), to rounding.
+
+        Returns:
+            In which rows all facts are as on the tape, shape (N,), and what reads words of `marked`, shape (N or 1, words).
+        """
+        values = self._values.copy()
+        values[: self._count] = numbers.T
+        same = np.ones(len(numbers), dtype=bool)
+        with np.errstate(all="ignore"):
+            for place, function, arguments, kind in self._steps:
+                many: Any = _OF_ROWS.get(function) or getattr(np, function.__name__, None)
+                if function not in _OF_ROWS and (not isinstance(many, np.ufunc) or many.nin != len(arguments)):
+                    many = function if function.__module__ == "_operator" else np.vectorize(function)
+                value = many(*[values[item] for item in arguments])
+                same &= np.isfinite(value) if kind is float else value == values[place]
+                values[place] = value if kind is float else values[place]
+
+        def read(words: str) -> FloatArray:
+            marks = [(_MARK.fullmatch(word), word) for word in words.split()]
+            given = [values[int(mark[1])] if mark else float(word) for mark, word in marks]
+            return np.stack(np.broadcast_arrays(*map(np.atleast_1d, given)), axis=1)
+
+        return same, read
 
     def _constant(self, value: Any) -> int:
         return self._place((type(value), repr(value)), value)
@@ -173,3 +202,5 @@ def _of_all(function: Callable[..., Any], *items: Any, **named: Any) -> Any:
 
 
 _OF_ALL = {name: partial(_of_all, function) for name, function in (("min", min), ("max", max), ("fsum", math.fsum))}
+_REDUCED = (("min", partial(reduce, np.minimum)), ("max", partial(reduce, np.maximum)), ("fsum", sum))
+_OF_ROWS: dict[Any, Any] = {_OF_ALL[name]: partial(_of_all, function) for name, function in _REDUCED}

@@ -28,7 +28,9 @@ class RecordedExpansions:
 
     def __init__(self, xacro_file: Path) -> None:
         """Begin without a recorded expansion."""
-        self._file, self._tapes = xacro_file, deque[Tape](maxlen=MOST_TAPES)
+        self._file = xacro_file
+        self.tapes = deque[Tape](maxlen=MOST_TAPES)
+        """The expansions, the last one first."""
 
     def text(self, numbers: Sequence[float], arguments: Mapping[str, str], traced: Traced) -> str | None:
         """Return the URDF text for the numbers and their arguments, digit for digit that of xacro.
@@ -43,7 +45,7 @@ class RecordedExpansions:
         return text
 
     def _recorded(self, numbers: Sequence[float], arguments: Mapping[str, str]) -> str | None:
-        all_texts = (tape.texts(numbers) for tape in tuple(self._tapes))
+        all_texts = (tape.texts(numbers) for tape in tuple(self.tapes))
         return next((texts[0] for texts in all_texts if texts and texts[1:] == list(arguments.values())), None)
 
     def _record(self, numbers: Sequence[float], traced: Traced) -> None:
@@ -51,4 +53,4 @@ class RecordedExpansions:
         with contextlib.suppress(DescriptionError, ArithmeticError, ValueError, TypeError, AttributeError):  # as of xacro
             arguments = traced(tape.numbers)
             if tape.keep(expand(self._file, arguments, tape), *arguments.values()):
-                self._tapes.appendleft(tape)
+                self.tapes.appendleft(tape)

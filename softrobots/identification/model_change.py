@@ -27,12 +27,13 @@ from softrobots.model.soft_model import SoftModel
 Stencil = tuple[float, dict[int, float]]
 """Step, relative to the scale of a parameter, and weights of the changes after so many steps."""
 
-_CENTRAL: Stencil = (1e-5, {-1: -0.5, 1: 0.5})
+CENTRAL: Stencil = (1e-5, {-1: -0.5, 1: 0.5})
 _FOURTH_ORDER: Stencil = (1e-3, {-2: 1.0 / 12.0, -1: -2.0 / 3.0, 1: 2.0 / 3.0, 2: -1.0 / 12.0})
 _UPWARDS: Stencil = (1e-5, {1: 2.0, 2: -0.5})
 _DOWNWARDS: Stencil = (1e-5, {-1: -2.0, -2: 0.5})
 _TYPICAL = {"m": 0.1, "Pa": 1e3}  # scales of parameters that may be zero, by unit; else 1
 _PLACED = ("placements", "frames")
+_ROUNDING = 1e-15  # change of a number that no parameter of a group changes, relative to the largest of its array
 _ASIDE = 1e-3  # how far from the present values they are told, relative: by symmetry some change nothing there
 
 
@@ -62,26 +63,29 @@ class ModelChange(NamedTuple):
         return np.asarray(rows.reshape(count * number, len(change)) @ change).reshape(count, number, self.n_parameters)
 
 
-def model_change(parameters: ParameterSet, values: Any = None, *, fourth_order: bool = False) -> ModelChange:
+def model_change(
+    parameters: ParameterSet, values: Any = None, *, fourth_order: bool = False, model: SoftModel | None = None
+) -> ModelChange:
     """Differentiate the numbers of a model by parameters; those that do not change the model have zeros.
 
     Args:
         parameters: The parameters.
         values: Their values, shape (P,); the present ones by default.
         fourth_order: Whether to load four models for each rather than two.
+        model: The robot with these values, if it is at hand.
 
     Raises:
         ParameterError: If the structure of the robot changes with a parameter about its value: a route that begins to wind, or
             friction that begins.
     """
     at = parameters.values if values is None else np.asarray(values, dtype=np.float64)
-    return _change(parameters, tuple(at.tolist()), fourth_order)
+    return _change(parameters, tuple(at.tolist()), fourth_order, model)
 
 
 @lru_cache(maxsize=4)
-def _change(parameters: ParameterSet, values: tuple[float, ...], fourth_order: bool) -> ModelChange:
+def _change(parameters: ParameterSet, values: tuple[float, ...], fourth_order: bool, model: SoftModel | None) -> ModelChange:
     at = np.array(values)
-    base, columns = numbers_of(parameters.model(at)), dict[str, FloatArray]()
+    base, columns = numbers_of(parameters.model(at) if model is None else model), dict[str, FloatArray]()
     for place, name, slope in number_slopes(parameters, at, parameters.numbers, base, fourth_order=fourth_order):
         column = _twists(base[name], slope) if name in _PLACED else slope.ravel()
         columns.setdefault(name, np.zeros((column.size, len(at))))[:, place] = column
@@ -108,10 +112,11 @@ def number_slopes(
     Raises:
         ParameterError: As `model_change` does.
     """
+    least = _ROUNDING / (_FOURTH_ORDER if fourth_order else CENTRAL)[0]
 
     def each(group: Mapping[int, Numbers]) -> Iterator[tuple[int, str, FloatArray]]:
         places = list(group)
-        scales = _scales(parameters, at)[places]
+        scales = scales_of(parameters, at)[places]
 
         def moved(steps: float) -> Numbers:
             changed = at.copy()
@@ -119,7 +124,10 @@ def number_slopes(
             return numbers(changed)
 
         slopes = _relative([parameters.parameters[place] for place in places], at[places], scales, base, moved, fourth_order)
-        if len(group) > 1 and any(np.any(slopes[name] * (sum(one[name] for one in group.values()) == 0)) for name in slopes):
+        rounding = {name: least * np.abs(base[name]).max(initial=0.0) for name in slopes}
+        if len(group) > 1 and any(
+            np.any(np.abs(slopes[name][sum(one[name] for one in group.values()) == 0]) > rounding[name]) for name in slopes
+        ):
             raise ParameterError("parameters", places, "of which each changes the numbers that it is known to change")
         for (place, touched), scale in zip(group.items(), scales.tolist(), strict=True):
             for name, slope in slopes.items():
@@ -144,7 +152,7 @@ def number_slopes(
 def _apart(parameters: ParameterSet, numbers: Callable[[FloatArray], Numbers]) -> list[dict[int, Numbers]]:
     """Groups of parameters that change the model of which no two change the same number, by place, with what each changes."""
     groups: list[dict[int, Numbers]] = []
-    random, step = np.random.default_rng(0), _ASIDE * _scales(parameters, parameters.values)
+    random, step = np.random.default_rng(0), _ASIDE * scales_of(parameters, parameters.values)
     step = np.where(parameters.values + 2.0 * step < parameters.upper, step, -step)
     aside = parameters.values + random.uniform(0.5, 1.0, len(step)) * step * parameters.of_model
     try:
@@ -209,7 +217,7 @@ def _relative(
 ) -> Numbers:
     """Derivatives by parameters that move at once, over their scales; `at` takes steps in these."""
     refusal = ""
-    for step, weights in (*([_FOURTH_ORDER] if fourth_order else []), _CENTRAL, _UPWARDS, _DOWNWARDS):
+    for step, weights in (*([_FOURTH_ORDER] if fourth_order else []), CENTRAL, _UPWARDS, _DOWNWARDS):
         tried = values + step * np.outer(list(weights), scales)
         if any(np.any(tried[:, k] < one.lower) or np.any(tried[:, k] > one.upper) for k, one in enumerate(some)):
             continue
@@ -228,7 +236,8 @@ def _scale(parameter: Parameter, value: float) -> float:
     return abs(value) if parameter.logarithmic else max(abs(value), _TYPICAL.get(parameter.unit, 1.0))
 
 
-def _scales(parameters: ParameterSet, values: FloatArray) -> FloatArray:
+def scales_of(parameters: ParameterSet, values: FloatArray) -> FloatArray:
+    """Return the scales of parameters at values, shape (P,)."""
     return np.array([_scale(one, value) for one, value in zip(parameters.parameters, values.tolist(), strict=True)])
 
 

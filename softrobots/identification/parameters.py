@@ -157,18 +157,21 @@ class ParameterSet:
         """Return the parameters of a kind with their numbers, from 0."""
         return [(number, one) for number, one in enumerate(self.parameters) if one.place.kind == kind]
 
-    def robot(self, values: Any) -> Any:
+    def robot(self, values: Any, *, described: bool = True) -> Any:
         """Return the dataclass with values, shape (P,), of the parameters that are fields; None without a dataclass.
+
+        Its URDF text is at hand, unless it is not to be `described`.
 
         Raises:
             ParameterError: If the shape differs, or the robot refuses a value.
         """
         numbers = finite_array("values", values, (len(self.parameters),))
-        if not self._entries:
+        if not self.entries:
             return self.present.robot
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AssumedStiffnessWarning)  # told when the robot was made
-            return self._variants.robot(numbers[list(self._entries.values())])
+            of_fields = numbers[list(self.entries.values())]
+            return self.variants.robot(of_fields) if described else self.variants.changed(of_fields)
 
     def model(self, values: Any) -> SoftModel:
         """Return the robot with values, shape (P,), loaded as the present one was.
@@ -231,18 +234,18 @@ class ParameterSet:
         return read_only(slopes)
 
     @cached_property
-    def _entries(self) -> dict[tuple[str, int | None], int]:
+    def entries(self) -> dict[tuple[str, int | None], int]:
         """Number of the parameter by each number of the dataclass that it sets."""
         fields = self.places("field")
         return {(one.place.names[0], part): number for number, one in fields for part in one.place.parts or (None,)}
 
     @cached_property
-    def _variants(self) -> Variants:
+    def variants(self) -> Variants:
         """The robot with its present values, where it has none with those in force."""
         rows = {one.place.names[0]: one.place.row for _, one in self.places("field") if one.place.row}
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", AssumedStiffnessWarning)
-            return Variants(replace(self.present.robot, **rows), list(self._entries))
+            return Variants(replace(self.present.robot, **rows), list(self.entries))
 
     @cached_property
     def _load_arguments(self) -> dict[str, Any]:
@@ -268,7 +271,4 @@ class ParameterSet:
         if len(set(self.names)) < len(self.names):
             twice = next(name for name in self.names if self.names.count(name) > 1)
             raise ParameterError("parameters", twice, "named once")
-        if self._entries:  # without a URDF text, which a list of names does not need
-            with warnings.catch_warnings():
-                warnings.simplefilter("ignore", AssumedStiffnessWarning)
-                self._variants.changed(self.values[list(self._entries.values())])
+        self.robot(self.values, described=False)

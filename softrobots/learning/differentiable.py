@@ -29,6 +29,7 @@ Kind = Literal["equilibrium", "estimate"]
 GENERAL = "pinocchio"
 """Name of the back end that solves every robot without dry friction; see `softrobots.learning.general_solver`."""
 
+_AT_ONCE = 1 << 10  # robots whose numbers are read at once
 _ADVICE = '; failed="nan" marks such rows instead'
 
 
@@ -115,7 +116,7 @@ class Differentiable:
             motors = without(motors, bad[: len(motors)], self.model.relaxed_motors)
             loads = without(loads, bad[: len(loads)])
         found = _Parts(count)
-        for rows, values in _groups(inputs[2], lead):
+        for rows, values in self._groups(inputs[2], lead):
             code, numbers, _ = self._changes.code(values)
             solver = code.equilibria if self.kind == "equilibrium" else code.estimates
             given = self._true(_picked(motors, rows), values), _picked(loads, rows)
@@ -135,7 +136,7 @@ class Differentiable:
         of_motors, of_load, of_parameters = (_flat(one, lead) for one in given)
         of_motors = of_motors + of_parameters @ self._set.offset_slopes.T
         found = _Parts(math.prod(lead), np.nan)
-        for rows, count, values, cases in self._cases(inputs, results, lead):
+        for rows, count, values, cases in self._cases(inputs, results, lead, slopes=rates[2] is not None):
             code, numbers, slopes = self._changes.code(values, slopes=rates[2] is not None)
             of_numbers = _picked(of_parameters, rows) @ slopes.T if slopes.size else np.zeros_like(numbers)
             whole = _picked(of_motors, rows), _picked(of_load, rows), of_numbers
@@ -167,12 +168,14 @@ class Differentiable:
         sums = np.zeros(values_of.shape)
         by_group = sums.reshape(math.prod(sums.shape[:-1]), -1)
         found = _Parts(math.prod(lead))
-        for group, (rows, count, values, cases) in enumerate(self._cases([*inputs[:2], values_of], results, lead, apart=True)):
-            code, numbers, slopes = self._changes.code(values, slopes=shapes[2] is not None)
+        by_values, apart = shapes[2] is not None, [*inputs[:2], values_of]
+        each_case = self._cases(apart, results, lead, apart=True, slopes=by_values)
+        for group, (rows, count, values, cases) in enumerate(each_case):
+            code, numbers, slopes = self._changes.code(values, slopes=by_values)
             picked = [_picked(one, rows) for one in given]
             *pulled, of_numbers = code.pull(self.kind, cases, self._gravity, numbers, picked, self._threads, count)
             found.put(rows, pulled)
-            if shapes[2] is not None:
+            if by_values:
                 by_group[group] = of_numbers @ slopes + pulled[0].sum(axis=0) @ self._set.offset_slopes
         wide = [*(one.reshape(*lead, -1) for one in found.arrays), sums]
         return tuple(
@@ -184,7 +187,7 @@ class Differentiable:
         return motors + offsets if np.any(offsets) else motors
 
     def _cases(
-        self, inputs: Sequence[Any], results: Sequence[Any], lead: tuple[int, ...], *, apart: bool = False
+        self, inputs: Sequence[Any], results: Sequence[Any], lead: tuple[int, ...], *, apart: bool = False, slopes: bool
     ) -> Iterator[tuple[Any, int, tuple[float, ...], Cases]]:
         """Yield rows, without those that failed, their number, values of the parameters, and the cases."""
         motors, load = (_flat(one, lead) for one in inputs[:2])
@@ -192,13 +195,33 @@ class Differentiable:
         solved = np.ones(math.prod(lead), dtype=bool)
         if not np.isfinite(springs.sum()):
             solved &= np.all(np.isfinite(springs), axis=1)
-        for rows, values in _groups(inputs[2], lead, apart=apart):
+        for rows, values in self._groups(inputs[2], lead, apart=apart, slopes=slopes):
             if not np.all(solved[rows]):
                 rows = np.arange(len(solved))[rows][solved[rows]]
             torques = _picked(load, rows) if force else np.zeros((1, self.model.n_motors))
             at = self._true(_picked(motors, rows), values)
             cases = Cases(at, _picked(force[0] if force else load, rows), torques, _picked(springs, rows))
             yield rows, len(solved[rows]), values, cases
+
+    def _groups(
+        self, parameters: Any, lead: tuple[int, ...], *, apart: bool = False, slopes: bool = False
+    ) -> Iterator[tuple[Any, tuple[float, ...]]]:
+        """Yield the rows that share values of the parameters, and these; or, `apart`, those of each row of parameters."""
+        values = np.asarray(parameters, dtype=np.float64)
+        each = values.reshape(math.prod(values.shape[:-1]), values.shape[-1])
+        place = np.arange(len(each))
+        if len(each) > 1 and not apart:
+            each, place = np.unique(each, axis=0, return_inverse=True)
+        if len(each) == 1:
+            yield slice(None), tuple(each[0].tolist())
+            return
+        group = np.broadcast_to(place.reshape(values.shape[:-1]), lead).ravel()
+        members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group, minlength=len(each)))[:-1])
+        every = list(map(tuple, each.tolist()))
+        for number, rows in enumerate(members):
+            if number % _AT_ONCE == 0 and isinstance(self._changes, NumberChanges):
+                self._changes.read(every[number : number + _AT_ONCE], slopes=slopes)
+            yield rows, every[number]
 
     def _refuse_input(self, bad: Any) -> None:
         """Refuse numbers that are not finite or too large."""
@@ -265,22 +288,6 @@ def _flat(array: Any, lead: tuple[int, ...]) -> FloatArray:
 def _picked(array: FloatArray, rows: Any) -> FloatArray:
     """Return some rows of an array; the one that is for all."""
     return array if len(array) == 1 else array[rows]
-
-
-def _groups(parameters: Any, lead: tuple[int, ...], *, apart: bool = False) -> Iterator[tuple[Any, tuple[float, ...]]]:
-    """Yield the rows that share values of the parameters, and these; or, `apart`, those of each row of parameters."""
-    values = np.asarray(parameters, dtype=np.float64)
-    each = values.reshape(math.prod(values.shape[:-1]), values.shape[-1])
-    place = np.arange(len(each))
-    if len(each) > 1 and not apart:
-        each, place = np.unique(each, axis=0, return_inverse=True)
-    if len(each) == 1:
-        yield slice(None), tuple(each[0].tolist())
-        return
-    group = np.broadcast_to(place.reshape(values.shape[:-1]), lead).ravel()
-    members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group, minlength=len(each)))[:-1])
-    for rows, row in zip(members, each.tolist(), strict=True):
-        yield rows, tuple(row)
 
 
 def _summed(array: FloatArray, shape: tuple[int, ...]) -> FloatArray:

@@ -38,7 +38,7 @@ class GeneralSolver:
         """Take the parameters, and compiled solvers for the equilibria of the robot as it is."""
         self._parameters, self._weight, self._compiled = parameters, weight, compiled
         self._varied = None if compiled is None or compiled.unknowns.is_unrolled else VariedChains(compiled, parameters)
-        self._at, self._change = lru_cache(maxsize=16)(self._model), lru_cache(maxsize=4)(self._model_change)
+        self._at, self._change = lru_cache(maxsize=1 << 12)(self._model), lru_cache(maxsize=4)(self._model_change)
 
     def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[GeneralResponses, FloatArray, FloatArray]:
         """Return the solver at values of the parameters, these as its numbers, shape (1, P), and their derivatives.
@@ -67,7 +67,7 @@ class GeneralSolver:
         return model, compiled, chain
 
     def _model_change(self, values: tuple[float, ...]) -> ModelChange:
-        return model_change(self._parameters, values)
+        return model_change(self._parameters, values, model=self._at(values)[0])
 
 
 class GeneralResponses(RowSolver):

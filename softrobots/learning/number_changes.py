@@ -6,6 +6,7 @@ parameters, not for each case.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +17,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.core.errors import ParameterError
 from softrobots.identification.model_change import number_slopes
 from softrobots.identification.parameters import ParameterSet
+from softrobots.learning.recorded_chains import many_numbers, many_slopes
 from softrobots.model.numbers import Numbers
 
 
@@ -35,6 +37,24 @@ class NumberChanges:
         constant = numbers_of(self._chain)
         self._inputs = NumberInputs(constant, ~np.isin(constant, (0.0, 1.0, -1.0)) | np.any(self.slopes(present), axis=1))
         self._responses = Responses(self._chain, backend, self._inputs, weight=weight)
+        self._read: dict[tuple[float, ...], tuple[FloatArray, FloatArray]] = {}
+
+    def read(self, each: Sequence[tuple[float, ...]], *, slopes: bool) -> None:
+        """Read the numbers of many robots at once, of which `code` is then asked, and the derivatives of those of before.
+
+        Raises:
+            ParameterError: If a robot refuses its values.
+        """
+        different, given = list(dict.fromkeys(each)), self._parameters
+        rows, changes = np.array(different), np.zeros((len(different), 0, 0))
+        if slopes and len(rows) > 1:
+            numbers, changes = many_slopes(given, rows, self.numbers)
+        else:
+            for values in different:
+                given.robot(values, described=False)
+            numbers = many_numbers(given, rows, self.numbers)
+        known = np.isfinite(numbers).all(axis=1) & np.isfinite(changes).all(axis=(1, 2))
+        self._read = {different[row]: (numbers[row], changes[row]) for row in np.flatnonzero(known).tolist()}
 
     def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[Responses, FloatArray, FloatArray]:
         """Return code that takes the numbers at values of the parameters; it is made anew if other numbers vary there.
@@ -50,8 +70,9 @@ class NumberChanges:
             ParameterError: If the robot refuses the values, or has other joints with them.
             DescriptionError: If the robot cannot be described with them.
         """
-        numbers = self.numbers(values)
-        by_parameter = self.slopes(values) if slopes else np.zeros((len(numbers), 0))
+        numbers, by_parameter = self._read.get(values) or (self.numbers(values), np.zeros((0, 0)))
+        if not by_parameter.size:
+            by_parameter = self.slopes(values) if slopes else np.zeros((len(numbers), 0))
         varied = self._inputs.varied | (numbers != self._inputs.constant) | np.any(by_parameter, axis=1)
         if np.any(varied != self._inputs.varied):
             self._inputs = NumberInputs(self._inputs.constant, varied)

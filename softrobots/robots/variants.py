@@ -4,7 +4,6 @@
     variants.values                     # the present numbers, shape (3,)
     other = variants.robot(values)      # equal to dataclasses.replace(robot, stiffness=..., base_mass=...), so checked
     load_model(other)                   # other.urdf() is at hand, digit for digit that of any equal robot; xacro does not run
-    variants.urdf(values)               # that text alone
 
 Their texts are those of `softrobots.description.recorded_expansions`.
 """
@@ -48,7 +47,8 @@ class Variants:
         for field, path in zip(fields, self._paths, strict=True):
             if path[0] not in facts_of(robot) or type(_number(robot, path)) is not float or self._paths.count(path) > 1:
                 raise ParameterError("fields", field, "pairs (field, part) that name numbers of the robot, each once")
-        self._expansions = RecordedExpansions(xacro_folder() / robot.XACRO)
+        self.expansions = RecordedExpansions(xacro_folder() / robot.XACRO)
+        """The recorded expansions, whose numbers are `values`."""
 
     @property
     def values(self) -> FloatArray:
@@ -83,10 +83,6 @@ class Variants:
         fields = {path[0]: getattr(raw, path[0]) for path in self._paths}
         return dataclasses.replace(self.base, **{name: _checked(value) for name, value in fields.items()})
 
-    def urdf(self, values: Sequence[float] | FloatArray) -> str:
-        """Return the URDF text of `robot(values)`; raises the same errors."""
-        return str(self.robot(values).urdf())
-
     def _numbers(self, robot: XacroRobot) -> list[float]:
         return [_number(robot, path) for path in self._paths]
 
@@ -97,7 +93,7 @@ class Variants:
         return robot
 
     def _text(self, robot: XacroRobot) -> str:
-        text = self._expansions.text(
+        text = self.expansions.text(
             self._numbers(robot), robot.xacro_arguments(), lambda numbers: self._with(robot, numbers).xacro_arguments()
         )
         return robot.urdf() if text is None else text

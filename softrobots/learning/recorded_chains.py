@@ -1,0 +1,118 @@
+"""Numbers of a chain for many rows of parameters at once, from recorded expansions of its description.
+
+A row of parameters of its own would load a robot: some 10 ms. What the xacro file computes is on tapes
+(`softrobots.description.number_tape`), whose operations NumPy does for all rows; the numbers in the text become those of the
+chain by composition of its placements and masses. Rows of which no tape tells, as where a comparison in the file comes out
+otherwise, and robots of which more than that changes, are loaded.
+"""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Callable
+from contextlib import suppress
+from functools import cache
+from itertools import chain as chain_of
+from typing import Any
+
+import numpy as np
+from scipy.spatial.transform import Rotation
+
+from softrobots.core.checks import FloatArray
+from softrobots.core.errors import SoftRobotsError
+from softrobots.identification.model_change import CENTRAL, scales_of
+from softrobots.identification.parameters import ParameterSet
+from softrobots.model.serial_chain import SerialChain
+
+Loaded = Callable[[tuple[float, ...]], FloatArray]
+"""Returns the numbers of a robot that is loaded, shape (n,)."""
+
+
+def many_numbers(parameters: ParameterSet, rows: FloatArray, loaded: Loaded) -> FloatArray:
+    """Return the numbers of robots, shape (N, n), at rows of parameters, (N, P); NaN of those that are to be loaded.
+
+    One robot of each tape is loaded, and tells whether its numbers are those of the tape.
+    """
+    chain, tip = parameters.present.chain(), parameters.present.tip
+    known = bool(parameters.entries) and not parameters.places("spring") and not chain.slack_hinges
+    constant, left = loaded(tuple(parameters.values.tolist())), np.arange(len(rows) * known)
+    numbers = np.full((len(rows), len(constant)), np.nan)
+    while left.size:
+        first, left = left, left[1:]
+        with suppress(SoftRobotsError):  # told when it is needed
+            expected, left = loaded(tuple(rows[first[0]].tolist())), left[:0]
+            for tape in tuple(parameters.variants.expansions.tapes):
+                same, read = tape.read_many(rows[first][:, list(parameters.entries.values())])
+                if same[0]:
+                    found = chain_columns(ElementTree.fromstring(tape.marked), chain, tip, read)
+                    if np.allclose(found[0], expected, rtol=1e-12, atol=1e-15):
+                        numbers[first], left = np.where(same[:, None], found, np.nan), first[~same]
+                    break
+    near = np.abs(numbers - constant) <= 1e-15 * np.abs(constant) + 4e-16
+    return np.where(near, constant, numbers)
+
+
+def many_slopes(parameters: ParameterSet, rows: FloatArray, loaded: Loaded) -> tuple[FloatArray, FloatArray]:
+    """Return these numbers, and their derivatives by central differences, shape (N, n, P)."""
+    (step, weights), units = CENTRAL, np.diag(parameters.of_model.astype(float))
+    steps = step * np.array([scales_of(parameters, row) for row in rows])
+    moved = np.stack([rows, *(rows + number * unit * steps for number in weights for unit in units)])
+    outside = np.any((moved < parameters.lower) | (moved > parameters.upper), axis=(0, 2))
+    found = many_numbers(parameters, moved.reshape(-1, len(units)), loaded).reshape(*moved.shape[:2], -1)
+    found[:, outside] = np.nan
+    by_step = np.tensordot(list(weights.values()), found[1:].reshape(len(weights), -1, *found.shape[1:]), 1)
+    return found[0], np.moveaxis(by_step, 0, 2) / steps[:, None, :]
+
+
+def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read: Callable[[str], FloatArray]) -> FloatArray:
+    """Return the numbers of chains that differ in numbers of their text, shape (N, n), in the order of `numbers_of`.
+
+    Placements `(R, p)` are composed along fixed joints, and masses `m` with centres `c` added where they are fixed:
+    `m (R c + p)` is the first moment.
+
+    Args:
+        root: The description.
+        chain: One of the chains, of joints without slack walls.
+        tip: Name of the tip.
+        read: Returns the words of an attribute as columns, shape (N or 1, words).
+    """
+    elements: Any = chain.elements
+    rows = {one.name: row for row, one in enumerate(elements)}
+    axes = [one.axes for one in elements] + [np.eye(3)]  # the last is the world's
+    above: dict[Any, Any] = {joint.find("child").get("link"): joint for joint in root.findall("joint")}  # type: ignore[union-attr]
+    places: list[list[FloatArray]] = [[] for _ in elements]
+    masses = [[read("0"), read("0 0 0")] for _ in axes]
+    springs = [[read(str(one)) for one in pair] for pair in zip(chain.stiffness, chain.rest, strict=True)]
+
+    def origin(element: ElementTree.Element, name: str) -> FloatArray:
+        given = element.find("origin")
+        return read("0 0 0" if given is None else given.get(name, "0 0 0"))
+
+    @cache
+    def placed(link: str | None) -> tuple[int, FloatArray, FloatArray]:
+        """Row of the joint that a link is fixed to, -1 for the world, and its placement there."""
+        joint = above.get(link)
+        if joint is None:
+            return -1, np.eye(3)[None], np.zeros((1, 3))
+        row, rotation, translation = placed(joint.find("parent").get("link"))
+        translation = translation + np.einsum("nij,nj->ni", rotation, origin(joint, "xyz"))
+        rotation = rotation @ Rotation.from_euler("xyz", origin(joint, "rpy")).as_matrix()
+        own = rows.get(joint.get("name"))
+        if own is None:
+            return row, rotation, translation
+        places[own] = [(axes[row].T @ rotation @ axes[own]).reshape(-1, 9), translation @ axes[row]]
+        for spring in joint.findall("{*}spring") if elements[own].strain is not None else ():
+            springs[elements[own].strain] = [read(spring.get(name, "0")) for name in ("stiffness", "rest")]
+        return own, np.eye(3)[None], np.zeros((1, 3))
+
+    for link in root.findall("link"):
+        row, rotation, translation = placed(link.get("name"))
+        for inertial in link.findall("inertial"):
+            mass = read(inertial.find("mass").get("value"))  # type: ignore[union-attr, arg-type]
+            mass[mass < 0.0] = np.nan  # the loader refuses it
+            moment = mass * (np.einsum("nij,nj->ni", rotation, origin(inertial, "xyz")) + translation) @ axes[row]
+            masses[row] = [masses[row][0] + mass, masses[row][1] + moment]
+    row, _, translation = placed(tip)
+    parts = [*chain_of(*places, [translation @ axes[row]], *zip(*springs, strict=True), *masses[:-1])]
+    count = max(map(len, parts))
+    return np.concatenate([np.broadcast_to(part, (count, part.shape[1])) for part in parts], axis=1)
