@@ -96,14 +96,9 @@ class Tape:
         return texts
 
     def read_many(self, numbers: FloatArray) -> tuple[Any, Callable[[str], FloatArray]]:
-        """Evaluate the tape for rows of other numbers, shape (N, n), to rounding.
-
-        Returns:
-            In which rows all facts are as on the tape, shape (N,), and what reads words of `marked`, shape (N or 1, words).
-        """
-        values = self._values.copy()
+        """Return in which rows of numbers, (N, n), facts are as taped, and what reads words of `marked`, (N or 1, words)."""
+        values, same = self._values.copy(), np.ones(len(numbers), dtype=bool)
         values[: self._count] = numbers.T
-        same = np.ones(len(numbers), dtype=bool)
         with np.errstate(all="ignore"):
             for place, function, arguments, kind in self._steps:
                 many: Any = _OF_ROWS.get(function) or getattr(np, function.__name__, None)

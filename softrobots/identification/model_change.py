@@ -124,9 +124,9 @@ def number_slopes(
             return numbers(changed)
 
         slopes = _relative([parameters.parameters[place] for place in places], at[places], scales, base, moved, fourth_order)
-        rounding = {name: least * np.abs(base[name]).max(initial=0.0) for name in slopes}
         if len(group) > 1 and any(
-            np.any(np.abs(slopes[name][sum(one[name] for one in group.values()) == 0]) > rounding[name]) for name in slopes
+            np.any(np.abs(slope[sum(one[name] for one in group.values()) == 0]) > least * np.abs(base[name]).max(initial=0.0))
+            for name, slope in slopes.items()
         ):
             raise ParameterError("parameters", places, "of which each changes the numbers that it is known to change")
         for (place, touched), scale in zip(group.items(), scales.tolist(), strict=True):

@@ -158,9 +158,7 @@ class ParameterSet:
         return [(number, one) for number, one in enumerate(self.parameters) if one.place.kind == kind]
 
     def robot(self, values: Any, *, described: bool = True) -> Any:
-        """Return the dataclass with values, shape (P,), of the parameters that are fields; None without a dataclass.
-
-        Its URDF text is at hand, unless it is not to be `described`.
+        """Return the dataclass with values, shape (P,), of the fields, `described` by its text; None without a dataclass.
 
         Raises:
             ParameterError: If the shape differs, or the robot refuses a value.

@@ -29,7 +29,7 @@ Kind = Literal["equilibrium", "estimate"]
 GENERAL = "pinocchio"
 """Name of the back end that solves every robot without dry friction; see `softrobots.learning.general_solver`."""
 
-_AT_ONCE = 1 << 10  # robots whose numbers are read at once
+_AT_ONCE = 1 << 8  # robots whose numbers are read at once
 _ADVICE = '; failed="nan" marks such rows instead'
 
 
@@ -59,7 +59,11 @@ class Differentiable:
         if backend is not None:
             choice("backend", backend, (*BACKENDS, GENERAL))
         names = [parameters] if isinstance(parameters, str) else list(parameters)
-        self._set = ParameterSet.of(given, names) if names else ParameterSet(_loaded(given), (), {})
+        self._set = (
+            ParameterSet.of(given, names)
+            if names
+            else ParameterSet(given if isinstance(given, SoftModel) else load_model(given), (), {})
+        )
         for one in self._set.parameters:
             if one.place.kind not in (*OF_MODEL, "offset"):
                 requirement = "parameters of the robot or offsets of motors; actuators and loads are arguments of their own"
@@ -111,7 +115,9 @@ class Differentiable:
         if motors.size and not (motors.min() >= -LARGEST_POSITION and motors.max() <= LARGEST_POSITION):
             bad = bad | (np.abs(motors).max(axis=1) > LARGEST_POSITION)
         if np.any(bad):
-            self._refuse_input(bad)
+            if self._failed == "raise":
+                requirement = f"finite motors and loads, not too large to compute with{_ADVICE}"
+                raise ParameterError("rows", np.flatnonzero(bad)[:8].tolist(), requirement)
             bad = np.broadcast_to(bad, count)
             motors = without(motors, bad[: len(motors)], self.model.relaxed_motors)
             loads = without(loads, bad[: len(loads)])
@@ -168,14 +174,13 @@ class Differentiable:
         sums = np.zeros(values_of.shape)
         by_group = sums.reshape(math.prod(sums.shape[:-1]), -1)
         found = _Parts(math.prod(lead))
-        by_values, apart = shapes[2] is not None, [*inputs[:2], values_of]
-        each_case = self._cases(apart, results, lead, apart=True, slopes=by_values)
+        each_case = self._cases([*inputs[:2], values_of], results, lead, apart=True, slopes=shapes[2] is not None)
         for group, (rows, count, values, cases) in enumerate(each_case):
-            code, numbers, slopes = self._changes.code(values, slopes=by_values)
+            code, numbers, slopes = self._changes.code(values, slopes=shapes[2] is not None)
             picked = [_picked(one, rows) for one in given]
             *pulled, of_numbers = code.pull(self.kind, cases, self._gravity, numbers, picked, self._threads, count)
             found.put(rows, pulled)
-            if by_values:
+            if shapes[2] is not None:
                 by_group[group] = of_numbers @ slopes + pulled[0].sum(axis=0) @ self._set.offset_slopes
         wide = [*(one.reshape(*lead, -1) for one in found.arrays), sums]
         return tuple(
@@ -223,12 +228,6 @@ class Differentiable:
                 self._changes.read(every[number : number + _AT_ONCE], slopes=slopes)
             yield rows, every[number]
 
-    def _refuse_input(self, bad: Any) -> None:
-        """Refuse numbers that are not finite or too large."""
-        if self._failed == "raise":
-            requirement = f"finite motors and loads, not too large to compute with{_ADVICE}"
-            raise ParameterError("rows", np.flatnonzero(bad)[:8].tolist(), requirement)
-
     def _refuse(self, statuses: Any, failed: Any, residuals: FloatArray) -> None:
         """Refuse rows without a result."""
         if self._failed == "nan":
@@ -258,10 +257,6 @@ class _Parts:
             self.arrays = [np.full((self._count, *part.shape[1:]), self._missing, dtype=part.dtype) for part in parts]
         for array, part in zip(self.arrays, parts, strict=True):
             array[rows] = part
-
-
-def _loaded(robot: Any) -> SoftModel:
-    return robot if isinstance(robot, SoftModel) else load_model(robot)
 
 
 def _is_unrolled(model: SoftModel) -> bool:

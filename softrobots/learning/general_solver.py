@@ -38,7 +38,7 @@ class GeneralSolver:
         """Take the parameters, and compiled solvers for the equilibria of the robot as it is."""
         self._parameters, self._weight, self._compiled = parameters, weight, compiled
         self._varied = None if compiled is None or compiled.unknowns.is_unrolled else VariedChains(compiled, parameters)
-        self._at, self._change = lru_cache(maxsize=1 << 12)(self._model), lru_cache(maxsize=4)(self._model_change)
+        self._at = lru_cache(maxsize=1 << 12)(self._model)
 
     def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[GeneralResponses, FloatArray, FloatArray]:
         """Return the solver at values of the parameters, these as its numbers, shape (1, P), and their derivatives.
@@ -48,8 +48,8 @@ class GeneralSolver:
             DescriptionError: If the robot cannot be described with them.
         """
         size = len(values)
-        change = self._change(values) if slopes else ModelChange(size, {})
         model, compiled, chain = self._at(values)
+        change = model_change(self._parameters, values, model=model) if slopes else ModelChange(size, {})
         robot = ChangingRobot(model, change, dict(zip(self._parameters.names, values, strict=True)), None)
         responses = GeneralResponses(robot, self._weight, compiled, chain)
         return responses, np.array(values).reshape(1, size), np.eye(size) if slopes else np.zeros((size, 0))
@@ -65,9 +65,6 @@ class GeneralSolver:
             compiled = None if self._varied is None else self._varied.at(model)
         chain = None if self._varied is None or compiled is None else ChainResponses(compiled, weight=self._weight)
         return model, compiled, chain
-
-    def _model_change(self, values: tuple[float, ...]) -> ModelChange:
-        return model_change(self._parameters, values, model=self._at(values)[0])
 
 
 class GeneralResponses(RowSolver):

@@ -40,11 +40,7 @@ class NumberChanges:
         self._read: dict[tuple[float, ...], tuple[FloatArray, FloatArray]] = {}
 
     def read(self, each: Sequence[tuple[float, ...]], *, slopes: bool) -> None:
-        """Read the numbers of many robots at once, of which `code` is then asked, and the derivatives of those of before.
-
-        Raises:
-            ParameterError: If a robot refuses its values.
-        """
+        """Check many robots and read their numbers at once, or their derivatives, too; `code` is then asked for each."""
         different, given = list(dict.fromkeys(each)), self._parameters
         rows, changes = np.array(different), np.zeros((len(different), 0, 0))
         if slopes and len(rows) > 1:

@@ -1,9 +1,7 @@
 """Numbers of a chain for many rows of parameters at once, from recorded expansions of its description.
 
-A row of parameters of its own would load a robot: some 10 ms. What the xacro file computes is on tapes
-(`softrobots.description.number_tape`), whose operations NumPy does for all rows; the numbers in the text become those of the
-chain by composition of its placements and masses. Rows of which no tape tells, as where a comparison in the file comes out
-otherwise, and robots of which more than that changes, are loaded.
+To load a robot takes some 10 ms. What its xacro file computes is on tapes (`softrobots.description.number_tape`), whose
+operations NumPy does for all rows; numbers of the text become those of the chain by composition of placements and masses.
 """
 
 from __future__ import annotations
@@ -24,22 +22,16 @@ from softrobots.identification.model_change import CENTRAL, scales_of
 from softrobots.identification.parameters import ParameterSet
 from softrobots.model.serial_chain import SerialChain
 
-Loaded = Callable[[tuple[float, ...]], FloatArray]
-"""Returns the numbers of a robot that is loaded, shape (n,)."""
 
-
-def many_numbers(parameters: ParameterSet, rows: FloatArray, loaded: Loaded) -> FloatArray:
-    """Return the numbers of robots, shape (N, n), at rows of parameters, (N, P); NaN of those that are to be loaded.
-
-    One robot of each tape is loaded, and tells whether its numbers are those of the tape.
-    """
+def many_numbers(parameters: ParameterSet, rows: FloatArray, loaded: Callable[[Any], FloatArray]) -> FloatArray:
+    """Return the numbers of robots, shape (N, n), at rows of parameters, (N, P); NaN of those that are to be loaded."""
     chain, tip = parameters.present.chain(), parameters.present.tip
     known = bool(parameters.entries) and not parameters.places("spring") and not chain.slack_hinges
     constant, left = loaded(tuple(parameters.values.tolist())), np.arange(len(rows) * known)
     numbers = np.full((len(rows), len(constant)), np.nan)
     while left.size:
         first, left = left, left[1:]
-        with suppress(SoftRobotsError):  # told when it is needed
+        with suppress(SoftRobotsError):  # told when it is needed; one robot of each tape is loaded, to confirm the tape
             expected, left = loaded(tuple(rows[first[0]].tolist())), left[:0]
             for tape in tuple(parameters.variants.expansions.tapes):
                 same, read = tape.read_many(rows[first][:, list(parameters.entries.values())])
@@ -52,7 +44,9 @@ def many_numbers(parameters: ParameterSet, rows: FloatArray, loaded: Loaded) -> 
     return np.where(near, constant, numbers)
 
 
-def many_slopes(parameters: ParameterSet, rows: FloatArray, loaded: Loaded) -> tuple[FloatArray, FloatArray]:
+def many_slopes(
+    parameters: ParameterSet, rows: FloatArray, loaded: Callable[[Any], FloatArray]
+) -> tuple[FloatArray, FloatArray]:
     """Return these numbers, and their derivatives by central differences, shape (N, n, P)."""
     (step, weights), units = CENTRAL, np.diag(parameters.of_model.astype(float))
     steps = step * np.array([scales_of(parameters, row) for row in rows])
@@ -68,13 +62,7 @@ def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read:
     """Return the numbers of chains that differ in numbers of their text, shape (N, n), in the order of `numbers_of`.
 
     Placements `(R, p)` are composed along fixed joints, and masses `m` with centres `c` added where they are fixed:
-    `m (R c + p)` is the first moment.
-
-    Args:
-        root: The description.
-        chain: One of the chains, of joints without slack walls.
-        tip: Name of the tip.
-        read: Returns the words of an attribute as columns, shape (N or 1, words).
+    `m (R c + p)` is the first moment. `read` returns words of the description as columns, shape (N or 1, words).
     """
     elements: Any = chain.elements
     rows = {one.name: row for row, one in enumerate(elements)}
@@ -113,6 +101,5 @@ def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read:
             moment = mass * (np.einsum("nij,nj->ni", rotation, origin(inertial, "xyz")) + translation) @ axes[row]
             masses[row] = [masses[row][0] + mass, masses[row][1] + moment]
     row, _, translation = placed(tip)
-    parts = [*chain_of(*places, [translation @ axes[row]], *zip(*springs, strict=True), *masses[:-1])]
-    count = max(map(len, parts))
-    return np.concatenate([np.broadcast_to(part, (count, part.shape[1])) for part in parts], axis=1)
+    parts = [one.T for one in chain_of(*places, [translation @ axes[row]], *zip(*springs, strict=True), *masses[:-1])]
+    return np.stack(np.broadcast_arrays(*chain_of(*parts)), axis=1)

@@ -47,9 +47,13 @@ class RowSolver:
             except ParameterError:
                 statuses[row] = Status.NOT_A_NUMBER
                 continue
-            load = self._load(push, gravity)
+            load = Load({model.tip: np.pad(push, (0, 3))}, tuple(gravity.tolist()) if self._weight else None)
             state, _, stable = solve_springs(model, checked, load, model.rest, tolerance=_FINE)
-            springs[row], tips[row], errors[row] = state.q_springs, self._tip(state.q), state.error
+            springs[row], tips[row], errors[row] = (
+                state.q_springs,
+                frame_placement(model, state.q, model.tip).translation,
+                state.error,
+            )
             if not state.error <= largest_residual(model, state.scale, TOLERANCE):
                 statuses[row] = Status.UNSETTLED
             elif not stable:
@@ -83,13 +87,6 @@ class RowSolver:
             elif not found.equilibrium.stable:
                 statuses[row] = Status.UNSTABLE
         return [springs, tips, forces, errors, statuses]
-
-    def _load(self, force: FloatArray, gravity: FloatArray) -> Load:
-        wrench = np.concatenate([force, np.zeros(3)])
-        return Load({self._model.tip: wrench}, tuple(gravity.tolist()) if self._weight else None)
-
-    def _tip(self, q: FloatArray) -> FloatArray:
-        return np.array(frame_placement(self._model, q, self._model.tip).translation)
 
     def _room(self, count: int) -> tuple[FloatArray, FloatArray, FloatArray, Any]:
         """Arrays for elastic coordinates, tips, errors and statuses."""
