@@ -37,6 +37,7 @@ _PATIENCE = 10  # steps of a search before full steps are tried
 _GAINED = 1e-4  # share of the cost that such a round of steps gains, or is idle
 _IDLE = 2  # idle rounds in a row after which a search ends
 _LEAPS = 6  # full steps in a row
+_SHORT = 1e-3  # share of a full step that is short
 _MOST_LOST = 0.9  # share of a positive parameter, or of its inverse, that such a step takes
 
 Stage = Literal["first", "last", "whole"]
@@ -131,7 +132,9 @@ class Fit:
             best = min(best, (cost, x, self._held), key=lambda one: one[0])
             if idle == _IDLE:
                 x, self._held = best[1:]
-                self.message = self.message if settled else f"not converged: the last of {spent} steps gained nothing"
+                if not settled:
+                    kink = self._is_kinked(x, *bounds)
+                    self.message = "converged" if kink else f"not converged: the last of {spent} steps gained nothing"
                 break
             self._held = held
         return x
@@ -139,8 +142,8 @@ class Fit:
     def _leap(self, x: FloatArray, lower: FloatArray, upper: FloatArray) -> FloatArray:
         """Take full steps of Gauss and Newton, the first of which may lose; return the best coordinates, shape (P,).
 
-        In a narrow valley that bends, a full step leaves it and the next one finds it again farther on, where steps of which
-        each gains are short. Without noise they also find all digits that rounding leaves.
+        In a narrow valley that bends, where steps of which each gains are short, a full step leaves it and the next one finds
+        it again farther on. Without noise they also find all digits that rounding leaves.
         """
         best, costs = x, [self._cost(x)]
         while len(costs) <= _LEAPS and (len(costs) < 3 or costs[-1] < costs[-2] * (1.0 - self._same)):
@@ -167,11 +170,10 @@ class Fit:
         """
         from scipy.optimize import lsq_linear
 
-        rows, slopes = self._rows(x), self._all_slopes(x)
-        size = np.sqrt(self._loss(rows**2)[1])
+        rows, slopes = self._weighed(x)
         norms = np.linalg.norm(slopes, axis=0)
         norms[norms == 0.0] = 1.0
-        small: FloatArray = np.linalg.qr(np.column_stack([slopes / norms, rows]) * size[:, None], mode="r")  # type: ignore[assignment]
+        small: FloatArray = np.linalg.qr(np.column_stack([slopes / norms, rows]), mode="r")  # type: ignore[assignment]
         for power in (1, 0, -1):
             most = np.where(self._logarithmic, _MOST_LOST, np.inf)
             low = np.maximum(lower - x, -most if power > 0 else -np.inf)
@@ -181,15 +183,11 @@ class Fit:
                 step[self._logarithmic] = power * np.log1p(power * step[self._logarithmic])
             yield np.clip(x + step, lower, upper)
 
-    def at_end(self) -> tuple[Prediction, FloatArray, FloatArray]:
-        """Return the prediction at the end, the residuals of what counts, (rows,), and their Jacobian, (rows, P)."""
+    def at_end(self) -> tuple[Prediction, FloatArray, FloatArray, FloatArray]:
+        """Return the prediction, residuals of what counts, (rows,), their Jacobian, (rows, P), and the priors' information."""
         x = self._coordinates(self.values)
         prediction = self.predictor.at(self._values(x))
-        return prediction, self.weights.flat(prediction.differences()), self._slopes(x)
-
-    def loss_slopes(self, residuals: FloatArray) -> FloatArray:
-        """Return how much less than its square each residual counts, shape (rows,)."""
-        return np.asarray(rho(self.loss, residuals**2)[1])
+        return prediction, self.weights.flat(prediction.differences()), self._slopes(x), self._information(x)
 
     @property
     def held(self) -> int:
@@ -202,12 +200,8 @@ class Fit:
         change = np.abs(rows @ moved) / np.maximum(np.linalg.norm(rows, axis=1), 1e-300)
         return int(np.count_nonzero(change <= _KEPT))
 
-    @property
-    def information(self) -> FloatArray:
-        """One over the square of the standard deviations of the priors, in the fitted coordinates, shape (P,)."""
-        return self._information(self._coordinates(self.values))
-
     def _information(self, x: FloatArray) -> FloatArray:
+        """One over the squares of the standard deviations of the priors, in the fitted coordinates."""
         found: FloatArray = np.zeros(len(x))
         found[self.prior.places] = (self._rates(x)[self.prior.places] / self.prior.std) ** 2
         return found
@@ -236,16 +230,15 @@ class Fit:
         return np.concatenate([data, known, self._held @ (x - self._anchor), self._weak @ (x - self._weak_anchor)])
 
     def _jacobian(self, x: FloatArray) -> FloatArray:
-        if self._moved(x) > (_NEARLY if self._stage == "first" else _NEAR):
+        change = np.abs(x - self._exact_at) / np.where(self._logarithmic, 1.0, np.maximum(np.abs(x), 1.0))
+        if np.max(change * self.predictor.parameters.of_model) > (_NEARLY if self._stage == "first" else _NEAR):
             self._refresh(x)
         self._record(x)
         next(self._steps)
         return self._all_slopes(x)
 
     def _all_slopes(self, x: FloatArray) -> FloatArray:
-        places = self.prior.places
-        known = np.zeros((len(places), len(x)))
-        known[np.arange(len(places)), places] = -self._rates(x)[places] / self.prior.std
+        known = -np.diag(self._rates(x))[self.prior.places] / self.prior.std[:, None]
         return np.concatenate([self._slopes(x), known, self._held, self._weak])
 
     def _record(self, x: FloatArray) -> None:
@@ -267,24 +260,29 @@ class Fit:
 
     def _is_lowest(self, x: FloatArray, lower: FloatArray, upper: FloatArray) -> bool:
         """Whether a step of Gauss and Newton with exact derivatives, along bounds, lowers the cost by no more than rounding."""
-        rows, slopes = self._rows(x), self._all_slopes(x)
-        size = np.sqrt(self._loss(rows**2)[1])
-        downhill = -(slopes.T @ (rows * size**2))
+        rows, slopes = self._weighed(x)
+        downhill = -(slopes.T @ rows)
         stopped = ((x - lower < _AT_BOUND) & (downhill < 0.0)) | ((upper - x < _AT_BOUND) & (downhill > 0.0))
-        left = np.linalg.qr(slopes[:, ~stopped] * size[:, None])[0]
-        gain, cost = float(np.sum((left.T @ (rows * size)) ** 2)), float(np.sum((rows * size) ** 2))
+        gain, cost = float(np.sum((np.linalg.qr(slopes[:, ~stopped])[0].T @ rows) ** 2)), float(rows @ rows)
         if self._same == _SAME_RUBBING and cost > 1e-6 * self.course[0][0]:
             return True  # kinks leave such steps a gain that they do not have
         return gain <= self._same * cost or cost <= _ROUNDING * self.course[0][0]
 
+    def _is_kinked(self, x: FloatArray, lower: FloatArray, upper: FloatArray) -> bool:
+        """Whether a short step gains less than half of what derivatives promise, as at a kink, where a tendon goes slack."""
+        rows, slopes = self._weighed(x)
+        step = _SHORT * (list(self._full_steps(x, lower, upper))[1] - x)
+        return self._cost(x) - self._cost(x + step) < -0.5 * float(rows @ (slopes @ step))
+
+    def _weighed(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """All rows and their derivatives, times the square root of how much the square of each counts."""
+        rows = self._rows(x)
+        size = np.sqrt(self._loss(rows**2)[1])
+        return rows * size, self._all_slopes(x) * size[:, None]
+
     def _loss(self, z: FloatArray) -> FloatArray:
         """The loss of what was measured; priors and held combinations are squared."""
         return np.concatenate([rho(self.loss, z[: self._linear]), rho("linear", z[self._linear :])], axis=1)
-
-    def _moved(self, x: FloatArray) -> float:
-        """Largest change of a parameter of the model since the numbers of the model were differentiated."""
-        change = np.abs(x - self._exact_at) / np.where(self._logarithmic, 1.0, np.maximum(np.abs(x), 1.0))
-        return float(np.max(change * self.predictor.parameters.of_model))
 
     def _refresh(self, x: FloatArray) -> None:
         self._exact_at = x

@@ -17,6 +17,7 @@ from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameter_names import Parameter
 from softrobots.identification.prediction import Predictor
 from softrobots.identification.uncertainty import Uncertainty, outliers, uncertainty_from_blocks, uncertainty_from_rows
+from softrobots.identification.weights import rho
 from softrobots.model.soft_model import SoftModel
 
 UNITS = {"positions": "m", "motor_torques": "N m or N", "tensions": "N", "frequencies": "Hz"}
@@ -198,9 +199,8 @@ class Identification(Summarised):
 def identification_of(fit: Fit, aside: Any) -> Identification:
     """Return the result of a fit, with predictions of what was kept aside: measurements, rows of the same course, or None."""
     predictor, weights = fit.predictor, fit.weights
-    prediction, residuals, slopes = fit.at_end()
-    parameters, information = predictor.parameters, fit.information
-    less = np.sqrt(fit.loss_slopes(residuals))  # a robust loss weighs rows
+    (prediction, residuals, slopes, information), parameters = fit.at_end(), predictor.parameters
+    less = np.sqrt(rho(fit.loss, residuals**2)[1])  # a robust loss weighs rows
     rows, labels = weights.rows(), predictor.measurements.labels
     blocks = rows if labels is None else np.unique(np.array(labels), return_inverse=True)[1][rows]
     weighted, downweighted = slopes * less[:, None], residuals * less

@@ -11,7 +11,7 @@ or given lengths, where they are differences of the whole course.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -36,9 +36,9 @@ from softrobots.model.numbers import LAW
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.elastic_state import ElasticState
 from softrobots.statics.elastostatics import balanced_state
-from softrobots.statics.loads import Load
 
 _TOLERANCE = 1e-12  # of residuals, relative to the load: derivatives are taken there
+_KEPT = 4, 24, 200_000  # least and most values whose equilibria are kept (from other starts there may be none), and rows of all
 
 
 class Seen(NamedTuple):
@@ -100,13 +100,11 @@ class Prediction:
                 slopes[:, :3, number] += rotation[..., one.place.parts[0]]
         slopes = np.concatenate([self._rotation @ slopes[:, i : i + 3] for i in range(0, count, 3)], axis=1)
         seen, turning = self.frame(name)[0] - self._position, self._rotation @ self._turning
-        for number, one in parameters.places("base"):
-            if one.place.names[0] == "position":
-                slopes[:, one.place.parts[0], number] += 1.0
-            else:
-                spin = turning[:, one.place.parts[0]]
-                slopes[:, :3, number] += np.cross(spin, seen)
-                slopes[:, 3:, number] += spin[: count - 3]
+        if "base" in parameters.direct_slopes:
+            moved, spin = np.split(parameters.direct_slopes["base"], 2)
+            spin = turning @ spin
+            slopes[:, :3] += moved + cross(spin.T, seen[:, None]).swapaxes(1, 2)
+            slopes[:, 3:] += spin[: count - 3]
         return slopes if turned else slopes[:, :3]
 
     def along(self, rows: AdjointRows) -> FloatArray:
@@ -136,7 +134,7 @@ class Prediction:
     def vibration(self) -> RowVibration:
         """Modes about the rows in which something of them was measured."""
         states = self.at.states
-        return RowVibration(self.model, states, self.predictor.cases(states.loads), self.predictor.measurements)
+        return RowVibration(self.model, states, load_cases(states.loads, len(states.q_motors)), self.predictor.measurements)
 
     @cached_property
     def vibration_slopes(self) -> dict[str, FloatArray]:
@@ -182,7 +180,7 @@ class Predictor:
         """Derivatives of the actuators by the parameters, shape (n_motors, P)."""
         self._springs: FloatArray | None = None
         self._last: Prediction | None = None
-        self._kept: tuple[Mapping[str, FloatArray], list[Load]] | None = None
+        self._solved: dict[bytes, tuple[States, FloatArray | None]] = {}
 
     def refresh(self, values: FloatArray) -> None:
         """Differentiate the model's numbers at given values.
@@ -206,7 +204,12 @@ class Predictor:
             ParameterError: If rows have no equilibrium; names them.
         """
         if self._last is None or not np.array_equal(self._last.values, values):
-            self._last = self.course(values)
+            model, key = self.parameters.model(values), values.tobytes()
+            found = self._solved.pop(key, None) or self._solve(model, values)
+            if len(self._solved) >= max(_KEPT[0], min(_KEPT[1], _KEPT[2] // len(self.measurements))):
+                del self._solved[next(iter(self._solved))]
+            self._solved[key], self._springs = found, found[0].q_springs
+            self._last = Prediction(self, np.array(values), model, *found)
         return self._last
 
     def course(self, values: FloatArray) -> Prediction:
@@ -239,7 +242,7 @@ class Predictor:
         self, model: SoftModel, motors: FloatArray, loads: dict[str, FloatArray], rows: Any, sliders: list[FloatArray]
     ) -> Iterable[tuple[int, ElasticState | None]]:
         """Search some rows from the equilibria of the values before, then from rest or the row before; appends sliders."""
-        now, before, cases = untouched(model), np.asarray(model.rest), self.cases(loads) if len(rows) else []
+        now, before, cases = untouched(model), np.asarray(model.rest), load_cases(loads, len(motors)) if len(rows) else []
         for row in rows.tolist():
             state = None
             if self.in_order:
@@ -249,12 +252,6 @@ class Predictor:
             if state is not None and self.in_order:
                 now, before = after_step(now, motors[row], state.q_springs), state.q_springs
             yield row, state
-
-    def cases(self, loads: Mapping[str, FloatArray]) -> list[Load]:
-        """Return the loads of the rows, made once while they stay the same."""
-        if self._kept is None or any(not np.array_equal(loads[name], self._kept[0][name]) for name in loads):
-            self._kept = loads, load_cases(loads, len(self.measurements))
-        return self._kept[1]
 
 
 def _position(prediction: Prediction, key: str, measured: FloatArray) -> Seen:
