@@ -252,6 +252,22 @@ def test_loads_of_wrong_sign_that_a_stiffness_absorbs_are_told(weighed: sr.Measu
     assert not any("changing" in text for text in hints(sr.identify(robot, sr.Measurements(**right), "stiffness")))
 
 
+def test_one_value_for_links_that_had_several_and_a_missing_weight_are_told() -> None:
+    """Rows of a heavy arm without the gravity under which they were measured, and one length for links of 0.6 and 0.4 m."""
+    arm = sr.InflatableArm(link_lengths=(0.6, 0.4), stiffness=100.0)
+    model, motors = sr.load_model(arm), np.random.default_rng(4).uniform(-1.0, 1.0, (12, 3))
+    tips = [sr.solve_equilibrium(model, one, gravity=sr.EARTH_GRAVITY).tip_position for one in motors]
+    rows = sr.Measurements(motors, tip_position=tips, gravity=sr.EARTH_GRAVITY, std=1e-3)
+    blind = sr.Measurements(motors, tip_position=tips, std=1e-3)
+    for names, measured, told in (
+        ("link_lengths", rows, "link_lengths: one value for parts that had 0.6, 0.4: [*] in its name fits one for each"),
+        ("link_lengths[*]", blind, "as its weight, since gravity is not given"),
+    ):
+        texts = hints(sr.identify(arm, measured, names))
+        assert any(told in text for text in texts), texts
+    assert hints(sr.identify(arm, rows, "link_lengths[*]")) == []
+
+
 @pytest.mark.study
 @pytest.mark.parametrize(("axes", "words"), [([1, 0, 2], "y, x, z"), ([0, 2, 1], "x, z, y")])
 def test_swapped_axes_that_a_fitted_base_hides_are_told(axes: list[int], words: str) -> None:

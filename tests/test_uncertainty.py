@@ -259,6 +259,21 @@ def test_a_known_null_space_is_named(parameters: Any, null: Any, kind: str, word
     assert find_gauges(jacobian, everything, prior=[0.0, 1e4] + [0.0] * len(null)) == ()
 
 
+def test_of_many_members_six_are_named() -> None:
+    """Those with the largest effect on predictions, and how many more there are."""
+    effects = np.array([3.0, 12.0, 5.0, 11.0, 1.0, 10.0, 2.0, 9.0, 4.0, 8.0, 6.0, 7.0])  # of steps of 1
+    rows = np.random.default_rng(5).standard_normal((40, 12))
+    jacobian = (rows - rows.mean(axis=1, keepdims=True)) / np.linalg.norm(rows - rows.mean(axis=1, keepdims=True), axis=0)
+    change = np.linalg.svd(jacobian)[2][-1] / effects
+    (found,) = find_gauges(1e3 * jacobian * effects, [Named(f"m{int(one)}", "m") for one in effects])
+    assert len(found.members) == 12
+    assert found.steps / change[list(found.members)] == pytest.approx(found.steps[0] / change[found.members[0]], rel=1e-6)
+    head, _, moves = found.text.partition(": only together")
+    assert head == f"{', '.join(found.names[:6])} and 6 more"
+    assert not set(found.names[6:]) & set(moves.split())
+    assert "and 6 more as they follow, changes no prediction by more than" in moves
+
+
 @given(seeds_, st.integers(1, 3))
 @settings(max_examples=20, deadline=None)
 def test_each_group_is_dependent_and_no_part_of_it(seed: int, count: int) -> None:

@@ -66,7 +66,8 @@ def add_parser(subparsers: Any) -> None:
     )
     parser.add_argument("--columns", type=Path, metavar="FILE", help=help_text)
     help_text = (
-        "names of the parameters to fit, with commas between: fields of the robot, link[2].stiffness, link[*].stiffness, "
+        "names of the parameters to fit, with commas between: fields of the robot (stiffness or link_lengths: one value "
+        "for all links, link[*].stiffness or link_lengths[*]: one for each), link[2].stiffness, "
         "joint[NAME].stiffness, base.position, base.rotation, marker.NAME.offset, motor[*].offset; given several times, the "
         "set with the least error on families of rows that are left out in turn is taken (required)"
     )

@@ -17,6 +17,7 @@ from softrobots.identification.uncertainty import UNDETERMINED, information, sca
 _STEP = 0.01  # largest change told, relative to what counts as large
 _LEFT_OUT = 1e-3  # share of the effect of the largest member below which a parameter is left out at once
 _SCALE = 1e-5  # change, relative to that of one member, above which noise hides a scale that a force does tell
+_NAMED = 6  # members that are named, those of largest effect, where there are many more
 _SAME = 0.05  # relative difference below which two steps count as equal
 
 _FIX = "fix one of them or give it a prior"
@@ -135,10 +136,13 @@ def _told(
     others = any(re.search(r"\b(N|Pa)\b", parameters[other].unit) for other in left if other not in members)
     effect = float(np.max(np.linalg.norm(rows[:, members] * steps, axis=0))) if len(members) > 1 else 0.0
     kind = _kind(chosen, steps, not others and change <= _SCALE * max(effect, 1e-6))
-    names = [one.name for one in chosen]
-    raised = [_amounts(chosen, steps, sign) for sign in (1.0, -1.0)]
+    names, few = [one.name for one in chosen], _NAMED if len(chosen) > _NAMED + 1 else len(chosen)
+    told, more = names[:few], [f"{len(names) - few} more"] if few < len(names) else []
+    raised = [_amounts(chosen[:few], steps[:few], sign) for sign in (1.0, -1.0)]
     moves = " and ".join(f"{verb} {words}" for verb, words in zip(("raising", "lowering"), raised, strict=True) if words)
-    head = names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
+    moves += f", and {more[0]} as they follow," if more else ""
+    *first, last = told + more
+    head = f"{', '.join(first)} and {last}" if first else last
     text = f"{head}: {_MEANING[kind]}: {moves} changes no prediction by more than {change:.1e} standard deviations"
     return Gauge(tuple(members), tuple(names), steps, change, kind, text)
 

@@ -13,7 +13,6 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from fnmatch import fnmatchcase
 from typing import Any
 
 import numpy as np
@@ -24,6 +23,7 @@ from softrobots.core.errors import NameNotFound, ParameterError, SoftRobotsError
 from softrobots.core.progress import with_progress
 from softrobots.identification.fit import INTERRUPTED, Fit, Stage
 from softrobots.identification.identification import Identification, identification_of
+from softrobots.identification.measurement_checks import labelled
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import QUANTITIES, Predictor
@@ -255,11 +255,7 @@ def _split(measurements: Measurements, validation: Any) -> tuple[Any, Any]:
         return counted, validation
     words = [validation] if isinstance(validation, str) else validation
     if isinstance(words, list | tuple) and words and all(isinstance(one, str) for one in words):
-        labels = measurements.labels or ("",) * len(measurements)
-        for word in words:
-            if not any(fnmatchcase(label, word) for label in labels):
-                raise NameNotFound("label", word, dict.fromkeys(labels))
-        aside = np.array([any(fnmatchcase(label, word) for word in words) for label in labels])
+        aside = labelled(measurements.labels or ("",) * len(measurements), words)
     else:
         aside = np.asarray(validation)
     if aside.dtype != bool or aside.shape != counted.shape or not np.any(counted & ~aside) or not np.any(counted & aside):

@@ -1,9 +1,8 @@
 """What a bad fit smells of: wrong units or frames, swapped or mirrored axes, shifted rows, commands of wrong sign or order.
 
-Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them. But
-where the rotation of the base is fitted, it hides most of a swapped axis, and other parameters hide reversed commands. Then
-linear steps from the robot as it was given tell the signs, and the whole fit is done again to other numbers, see
-`softrobots.identification.refits`.
+Each remedy is tried on the measured numbers, without solving the robot again, and told where it explains far more of them. A
+fitted base hides most of a swapped axis, other parameters hide reversed commands. Then linear steps from the robot as it was
+given tell the signs, and the fit is done again to other numbers, see `softrobots.identification.refits`.
 """
 
 from __future__ import annotations
@@ -82,14 +81,14 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
         elif len(texts) == before and found.loss == "linear" and share > _MUCH:
             texts.append(f'{key}: outliers leave {100.0 * share:.2g} % of the variance: mask them, or give a loss, "cauchy"')
         if key in rows.std:
-            sizes = np.abs(found.residuals[key] / rows.std[key])
-            ratio = _TO_STD * float(np.median(sizes[np.isfinite(sizes)]))
+            ratio = _TO_STD * float(np.nanmedian(np.abs(found.residuals[key] / rows.std[key])))
             if ratio > _BADLY:
+                weight = "" if "gravity" in rows.loads else ", as its weight, since gravity is not given"
                 texts.append(
                     f"{key}: what is left is {ratio:.2g} times the standard deviation that was given: the robot differs in "
-                    "what is not fitted, or the standard deviation is larger; the intervals by rows are too narrow"
+                    f"what is not fitted{weight}, or the standard deviation is larger; the intervals by rows are too narrow"
                 )
-    return (texts or value_units(found)) + _far_from_priors(found)
+    return (texts or value_units(found)) + _far_from_priors(found) + _tied(found)
 
 
 def suspicions(
@@ -179,10 +178,20 @@ def _far_from_priors(found: Identification) -> list[str]:
     far = sorted((name for name in off if abs(off[name]) > _FAR), key=lambda name: -abs(off[name]))
     if not far:
         return []
-    named = ", ".join(f"{name} {off[name]:+.2g}" for name in far[:6]) + (f" and {len(far) - 6} more" if far[6:] else "")
+    named = ", ".join(f"{name} {off[name]:+.2g}" for name in far[:6]) + f" and {len(far) - 6} more" * bool(far[6:])
     return [
         f"far from what was known before, in standard deviations of the prior: {named}; are the sizes of the robot and the "
         "priors right, and order and sign of the actuators?"
+    ]
+
+
+def _tied(found: Identification) -> list[str]:
+    """The parameters that gave one value to parts which had different ones."""
+    rows = {one.name: [one.place.row[part] for part in one.place.parts] for one in found.parameters if one.place.row}
+    return [
+        f"{name}: one value for parts that had {', '.join(f'{value:.6g}' for value in row)}: [*] in its name fits one for each"
+        for name, row in rows.items()
+        if len(set(row)) > 1
     ]
 
 
