@@ -24,6 +24,7 @@ from softrobots.identification.fit import INTERRUPTED
 from softrobots.identification.identification import Identification
 from softrobots.identification.identify import LOSSES, identify
 from softrobots.identification.measured_robot import frame_of
+from softrobots.identification.measurement_checks import labelled
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.suspicions import doubtful_sizes, hints
@@ -164,7 +165,7 @@ def _compare(
     """The errors of sets of parameters on families that are left out, if that is asked for."""
     if len(sets) == 1 and arguments.families is None:
         return None
-    seen = rows if arguments.hold_out is None else rows.without_labels(*arguments.hold_out)
+    seen = rows if arguments.hold_out is None else rows[~labelled(rows.labels or (), arguments.hold_out)]
     return cross_validate(model, seen, sets, arguments.families, progress=True, **options)
 
 

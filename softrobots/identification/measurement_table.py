@@ -70,9 +70,6 @@ class MeasurementTables:
         """
         return cls(**arguments_of_table(table, columns))
 
-    from_table = from_dataframe
-    """The first name of `from_dataframe`."""
-
     def to_csv(self, path: str | os.PathLike[str], *, overwrite: bool = False) -> Path:
         """Write a CSV file in SI units that `from_csv` reads to the last bit; its first line is a comment with the mapping.
 

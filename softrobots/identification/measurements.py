@@ -204,10 +204,6 @@ class Measurements(MeasurementTables, Summarised):
         """Return the rows of some labels, which may be patterns such as `rep1_*`; raise NameNotFound if one has no row."""
         return self[labelled(self.labels or (), patterns)]
 
-    def without_labels(self, *patterns: str) -> Measurements:
-        """Return the rows of other labels than these, which may be patterns; raise NameNotFound if one has no row."""
-        return self[~labelled(self.labels or (), patterns)]
-
     def where(self, row: int) -> str:
         """Return what a row is called: its line in the file, or its number from 0."""
         return f"row {row}" if self.lines is None else f"line {self.lines[row]}"
