@@ -522,3 +522,22 @@ def test_rows_without_an_equilibrium_are_named() -> None:
     data = sr.Measurements(np.zeros((3, 3)), wrench=[[0.0] * 6, [0, 0, 0, 0, 90.0, 0], [0.0] * 6], tip_position=np.ones((3, 3)))
     with pytest.raises(sr.ParameterError, match=r"row 1 have none.*mask"):
         sr.identify(arm, data, "stiffness")
+
+
+def test_a_row_kept_aside_without_an_equilibrium_is_told_and_ends_no_fit(tmp_path: Path) -> None:
+    """The others are predicted as if it were not there; nor does a file of the fit lose it."""
+    arm = sr.InflatableArm(stiffness=170.0, max_moment=10.0)
+    model, motors = sr.load_model(arm), np.array([[0.1, 0.3, -0.2], [0.5, 0.2, 0.4], [0.0, -0.4, 0.3], [0.3, 0.1, 0.1]])
+    tips = [sr.solve_equilibrium(model, one, (0.0, 0.0, -2.0)).tip_position for one in motors]
+    loads = np.tile((0.0, 0.0, -2.0, 0.0, 0.0, 0.0), (4, 1))
+    rows = sr.Measurements(motors, wrench=loads, tip_position=tips, std=1e-3)
+    loads[1] = (0.0, 0.0, 0.0, 0.0, 90.0, 0.0)  # beyond the largest moment of the springs
+    aside = sr.Measurements(motors, wrench=loads, tip_position=np.add(tips, 0.001), std=1e-3)
+    fit = sr.identify(sr.InflatableArm(stiffness=150.0, max_moment=10.0), rows, "stiffness", validation=aside)
+    alike = sr.identify(sr.InflatableArm(stiffness=150.0, max_moment=10.0), rows, "stiffness", validation=aside[[0, 2, 3]])
+    assert fit.validation is not None
+    assert alike.validation is not None
+    assert (fit.validation.lost, fit.validation.n_counted, alike.validation.lost) == ([1], 3, [])
+    assert fit.validation.errors["positions.tip"][0] == pytest.approx(alike.validation.errors["positions.tip"][0], rel=1e-9)
+    assert "kept aside, without an equilibrium: row 1" in fit.summary(None)
+    assert sr.load_result(sr.save_result(fit, tmp_path / "fit.npz")).validation.lost == [1]

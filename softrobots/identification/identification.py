@@ -42,6 +42,13 @@ class Comparison(NamedTuple):
         return int(np.any(there, axis=0).sum())
 
     @property
+    def lost(self) -> list[int]:
+        """Rows of which nothing is predicted, as they have no equilibrium."""
+        return np.flatnonzero(
+            [all(np.isnan(one[row]).all() for one in self.predicted.values()) for row in range(len(self.measurements))]
+        ).tolist()
+
+    @property
     def errors(self) -> dict[str, tuple[float, str]]:
         """Root mean square of the residuals by quantity, of positions of their length, and unit.
 
@@ -182,6 +189,9 @@ class Identification(Summarised):
         if self.outliers:
             where = self.fitted.measurements.where
             lines.append(f"outliers ({len(self.outliers)} rows): {', '.join(map(where, self.outliers[:10]))}")
+        if self.validation is not None and self.validation.lost:
+            where = self.validation.measurements.where
+            lines.append(f"kept aside, without an equilibrium: {', '.join(map(where, self.validation.lost[:10]))}")
         if self.held:
             lines.append(f"combinations that the measurements do not tell, which kept their start: {self.held}")
         lines += [f"not told apart: {text}" for text in self.unidentifiable]
@@ -217,7 +227,10 @@ def identification_of(fit: Fit, aside: Any) -> Identification:
     means = {predictor.parameters.names[i]: pair for i, *pair in zip(*map(np.ndarray.tolist, fit.prior), strict=True)}
     validation = None
     if isinstance(aside, Measurements):
-        others = Predictor(parameters, aside).at(fit.values)
+        predicting = Predictor(parameters, aside, gaps=True)
+        others = predicting.at(fit.values)
+        for seen in others.seen.values():
+            seen.values[predicting.lost] = seen.difference[predicting.lost] = np.nan
         validation = _comparison(aside, others, {key: np.ones(one.shape, bool) for key, one in others.differences().items()})
     elif aside is not None:
         rows_aside = {key: np.repeat(aside[:, None], one.shape[1], axis=1) for key, one in prediction.differences().items()}

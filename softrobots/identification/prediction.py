@@ -160,8 +160,8 @@ class Prediction:
 class Predictor:
     """Predictions of measured rows for values of parameters."""
 
-    def __init__(self, parameters: ParameterSet, measurements: Measurements) -> None:
-        """Check that the measurements can be those of the robot.
+    def __init__(self, parameters: ParameterSet, measurements: Measurements, *, gaps: bool = False) -> None:
+        """Check that the measurements can be those of the robot; `gaps` says whether rows may lack an equilibrium.
 
         Raises:
             ParameterError: If they are not, see `Measurements.check`.
@@ -179,6 +179,7 @@ class Predictor:
         self.actuator_slopes = parameters.offset_slopes
         """Derivatives of the actuators by the parameters, shape (n_motors, P)."""
         self._springs: FloatArray | None = None
+        self.gaps, self.lost = gaps, list[int]()
         self._last: Prediction | None = None
         self._solved: dict[bytes, tuple[States, FloatArray | None]] = {}
 
@@ -223,15 +224,16 @@ class Predictor:
         loads = loads_on(model, measurements.loads, np.asarray(pin.exp3(turn)))
         starts = np.tile(model.rest, (len(motors), 1)) if self._springs is None else self._springs
         states, found = balanced_rows(model, motors, loads, starts, _TOLERANCE)
-        sliders, lost = list[FloatArray](), list[str]()
+        sliders, self.lost = list[FloatArray](), []
         for row, state in self._equilibria(model, motors, loads, np.flatnonzero(~found), sliders):
             if state is None:
-                lost.append(measurements.where(row))
+                self.lost.append(row)
                 continue
             states.q_springs[row], states.tangent[row] = state.q_springs, state.tangent
             states.actuator_loads[row], states.coupling[row] = state.load.motors, state.load.coupling
-        if lost:
-            words = ", ".join(lost[:10]) + (f" and {len(lost) - 10} more" if len(lost) > 10 else "") + " have none"
+        if self.lost and not self.gaps:
+            more = f" and {len(self.lost) - 10} more" if len(self.lost) > 10 else ""
+            words = ", ".join(map(measurements.where, self.lost[:10])) + more + " have none"
             requirement = f"rows with an equilibrium at the values to start from; {words}: start from others, or leave them out"
             requirement += " by the mask; are order, signs and units of actuators and loads right?"
             raise ParameterError("measurements", measurements, requirement)

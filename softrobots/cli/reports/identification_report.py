@@ -48,12 +48,10 @@ def identification_lines(found: Identification, compared: CrossValidation | None
     """The same for a person."""
     lines = found.summary(None).split("\n")
     for title, one in (("fitted", found.fitted), ("kept aside", found.validation)):
-        for key, error in _about_mean(one).items() if one is not None else ():
-            median = np.nanmedian(np.linalg.norm(one.residuals[key], axis=1))
-            lines += [
-                f"{key}, without the mean of {title} rows: {error:.4g} m",
-                f"{key}, median of {title} rows: {median:.4g} m",
-            ]
+        for key, error in ({} if one is None else _about_mean(one)).items():
+            distances = np.linalg.norm(one.residuals[key], axis=1)  # type: ignore[union-attr]
+            lines.append(f"{key}, without the mean of {title} rows: {error:.4g} m")
+            lines.append(f"{key}, median of {title} rows: {np.nanmedian(distances):.4g} m")
     lines += [f"hint: {text}" for text in causes]
     if found.robot is None:
         words = (f"--spring {joint}={stiffness:.6g},{rest:.6g}" for joint, (stiffness, rest) in _springs(found).items())
