@@ -11,7 +11,6 @@ import softrobots as sr
 from softrobots.core.errors import ParameterError
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
-from tests.support.laws import law
 
 ARM = sr.TendonArm(segment_lengths=(0.06, 0.06), elastic_sections=1, tendon_pretension=0.5)
 NAMES = ("motor[*].offset", "tendon[*].tendon_stiffness", "segment[*].bending_stiffness", "offset[2]")
@@ -43,7 +42,6 @@ def fit(rows: sr.Measurements) -> sr.Identification:
     return sr.identify(ARM, rows, NAMES, priors=PRIORS)
 
 
-@law("identify")
 def test_a_fit_that_ends_at_a_kink_has_converged(rows: sr.Measurements, fit: sr.Identification) -> None:
     """The sum of squares, of equilibria solved anew, is lower nowhere within 1, 0.1 and 0.01 standard errors."""
     chosen = ParameterSet.of(ARM, NAMES)
