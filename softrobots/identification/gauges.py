@@ -54,9 +54,6 @@ class Gauge:
     text: str
     """The whole finding in words."""
 
-    def __str__(self) -> str:
-        return self.text
-
 
 def find_gauges(jacobian: Any, parameters: Sequence[Parameter], *, prior: Any = 0.0) -> tuple[Gauge, ...]:
     """Return the smallest groups of parameters that the measurements do not tell apart.

@@ -75,12 +75,6 @@ class History(NamedTuple):
     values: FloatArray
     """Values of the parameters, shape (n, P)."""
 
-    @property
-    def steps(self) -> FloatArray:
-        """Largest change of a parameter in each step, relative to its value or, if that is smaller, 1 in its unit, (n - 1,)."""
-        change = np.abs(np.diff(self.values, axis=0)) / np.maximum(np.abs(self.values[1:]), 1.0)
-        return np.asarray(change.max(axis=1, initial=0.0))
-
 
 @dataclass(frozen=True, eq=False, repr=False, kw_only=True)
 class Identification(Summarised):
@@ -246,7 +240,7 @@ def identification_of(fit: Fit, aside: Any) -> Identification:
         fitted=_comparison(predictor.measurements, prediction, weights.counted),
         validation=validation,
         outliers=tuple(dict.fromkeys(rows[worst].tolist())),
-        unidentifiable=tuple(map(str, found)),
+        unidentifiable=tuple(one.text for one in found),
         held=fit.held,
         history=History(*(read_only(np.array(column)) for column in zip(*fit.course, strict=True))),
         priors={name: (float(mean), float(std)) for name, (mean, std) in means.items()},

@@ -131,7 +131,7 @@ def informative_poses(
     everything = uncertainty(...)
     if not everything.determined.all():
         (first, *_) = find_gauges(np.concatenate([before, *rows]), chosen.parameters, prior=known)
-        raise ParameterError("parameters", chosen.names, f"such that the candidates tell them apart; not so {first}")
+        raise ParameterError("parameters", chosen.names, f"such that the candidates tell them apart; not so {first.text}")
     start = before.T @ before + np.diag(known)
     indices = d_optimal(rows, n, start)
     best, doubled = uncertainty(indices), "random, twice as many"
