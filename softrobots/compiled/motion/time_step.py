@@ -70,12 +70,14 @@ def _judge(layout: MotionLayout, block: Block) -> Block:
     """By the last correction, by what the next would be, or as far as rounding lets.
 
     The next one is expected to shrink as the last one did, and up to ten times less, as that one may have had other factors.
-    Where two have shrunk to a tenth or less, it is expected to shrink as the worse of them.
+    Where two have shrunk to a tenth or less, it is expected to shrink as the worse of them. None shrinks by more than 1000:
+    a guess may be near by chance.
     """
     change, last, before = (block.load(place) for place in (layout.change, layout.last_change, layout.change_before))
     as_before = if_less(before, 1.0, if_less(change * last, MOTION_TOLERANCE * before, 1.0, 0.1), 0.1)
     known = if_less(last, 0.1 * before, as_before, 0.1)
     next_is_small = if_less(known * MOTION_TOLERANCE * last, change * change, 0.0, 1.0)
+    next_is_small = if_less(change, 1e3 * MOTION_TOLERANCE, next_is_small, 0.0)
     shrinking = if_less(change, 0.01 * last, if_less(last, 1.0, next_is_small, 0.0), 0.0)
     rounded = if_less(0.5 * last, change, if_less(MOTION_ROUNDING, change, 0.0, 1.0), 0.0)
     block.store(layout.change_before, last)
