@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.view.body import body
+from softrobots.view.body import body_at
 from softrobots.view.interactive.robot_data import robot_data
 from softrobots.view.robot_shapes import RobotShapes
 from softrobots.view.slider_ranges import visible_force
@@ -140,7 +140,7 @@ def test_the_page_solves_and_draws_what_python_solves(
         for pose in poses:  # the page leaves out pieces of the chain in sections; 1e-7 m is what is rounded in the file
             assert np.abs(everything - pose).max(axis=(1, 2)).min() < 3e-7
         if model.structure.section_table:
-            points = np.concatenate([segment.backbone for segment in body(expected)])
+            points = np.concatenate([segment.backbone for segment in body_at(model, expected.q_motors, expected.q_springs)])
             # corners are numbers of 32 bits; lumped sections end near the smooth body, a fifth of its radius
             near = 3e-7 if model.structure.constant_strain else 0.2 * model.structure.section_table[0].radius
             assert drawn["rings"]
