@@ -11,7 +11,7 @@ Curtis, M. J. D. Powell, J. K. Reid, IMA Journal of Applied Mathematics 13:117-1
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, NamedTuple
 
@@ -54,6 +54,15 @@ class ModelChange(NamedTuple):
     `placements` and `frames` change by twists of six rows each, in the joint before: linear part at its origin, then angular.
     """
 
+    @classmethod
+    def of(cls, size: int, base: Numbers, slopes: Iterable[tuple[int, str, FloatArray]]) -> ModelChange:
+        """Gather derivatives of arrays by number of the parameter and name of the array; `base` has the placements."""
+        columns = dict[str, FloatArray]()
+        for place, name, slope in slopes:
+            column = _twists(base[name], slope) if name in _PLACED else slope.ravel()
+            columns.setdefault(name, np.zeros((column.size, size)))[:, place] = column
+        return cls(size, columns)
+
     def along(self, name: str, rows: FloatArray) -> FloatArray | float:
         """Return the change of rows of outputs, shape (N, L, P), from their derivatives by a number, shape (N, L, ...)."""
         if name not in self.by_number:
@@ -85,11 +94,9 @@ def model_change(
 @lru_cache(maxsize=4)
 def _change(parameters: ParameterSet, values: tuple[float, ...], fourth_order: bool, model: SoftModel | None) -> ModelChange:
     at = np.array(values)
-    base, columns = numbers_of(parameters.model(at) if model is None else model), dict[str, FloatArray]()
-    for place, name, slope in number_slopes(parameters, at, parameters.numbers, base, fourth_order=fourth_order):
-        column = _twists(base[name], slope) if name in _PLACED else slope.ravel()
-        columns.setdefault(name, np.zeros((column.size, len(at))))[:, place] = column
-    return ModelChange(len(at), columns)
+    base = numbers_of(parameters.model(at) if model is None else model)
+    slopes = number_slopes(parameters, at, parameters.numbers, base, fourth_order=fourth_order)
+    return ModelChange.of(len(at), base, slopes)
 
 
 def number_slopes(

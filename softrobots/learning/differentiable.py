@@ -224,7 +224,7 @@ class Differentiable:
         members = np.split(np.argsort(group, kind="stable"), np.cumsum(np.bincount(group, minlength=len(each)))[:-1])
         every = list(map(tuple, each.tolist()))
         for number, rows in enumerate(members):
-            if number % _AT_ONCE == 0 and isinstance(self._changes, NumberChanges):
+            if number % _AT_ONCE == 0:
                 self._changes.read(every[number : number + _AT_ONCE], slopes=slopes)
             yield rows, every[number]
 

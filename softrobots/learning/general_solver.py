@@ -24,10 +24,12 @@ from softrobots.identification.parameters import ParameterSet
 from softrobots.learning.chain_responses import ChainResponses
 from softrobots.learning.equilibrium_points import ChainPoints, ChangingRobot, EquilibriumPoints, PinocchioPoints
 from softrobots.learning.force_condition import ForceCondition
+from softrobots.learning.recorded_models import RecordedModels
 from softrobots.learning.row_solver import RowSolver
 from softrobots.learning.varied_chains import VariedChains
 from softrobots.model.soft_model import SoftModel
 
+_AT_ONCE = 16  # robots whose derivatives are found at once
 _SIZE = 1 << 20  # numbers of the twists of a chunk of cases
 
 
@@ -39,6 +41,14 @@ class GeneralSolver:
         self._parameters, self._weight, self._compiled = parameters, weight, compiled
         self._varied = None if compiled is None or compiled.unknowns.is_unrolled else VariedChains(compiled, parameters)
         self._at = lru_cache(maxsize=1 << 12)(self._model)
+        self._recorded, self._changes = RecordedModels(parameters), dict[tuple[float, ...], ModelChange]()
+
+    def read(self, each: Sequence[tuple[float, ...]], *, slopes: bool) -> None:
+        """Find derivatives of many robots at once, if they are needed; `code` is then asked for each."""
+        self._changes = {}
+        for first in range(0, len(each) * slopes, _AT_ONCE):
+            some = each[first : first + _AT_ONCE]
+            self._changes |= self._recorded.changes(some, [self._at(values)[0] for values in some])
 
     def code(self, values: tuple[float, ...], *, slopes: bool = False) -> tuple[GeneralResponses, FloatArray, FloatArray]:
         """Return the solver at values of the parameters, these as its numbers, shape (1, P), and their derivatives.
@@ -49,7 +59,9 @@ class GeneralSolver:
         """
         size = len(values)
         model, compiled, chain = self._at(values)
-        change = model_change(self._parameters, values, model=model) if slopes else ModelChange(size, {})
+        change = ModelChange(size, {})
+        if slopes:
+            change = self._changes.get(values) or model_change(self._parameters, values, model=model)
         robot = ChangingRobot(model, change, dict(zip(self._parameters.names, values, strict=True)), None)
         responses = GeneralResponses(robot, self._weight, compiled, chain)
         return responses, np.array(values).reshape(1, size), np.eye(size) if slopes else np.zeros((size, 0))

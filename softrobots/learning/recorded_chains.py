@@ -7,7 +7,7 @@ operations NumPy does for all rows; numbers of the text become those of the chai
 from __future__ import annotations
 
 import xml.etree.ElementTree as ElementTree
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from functools import cache
 from itertools import chain as chain_of
@@ -21,6 +21,9 @@ from softrobots.core.errors import SoftRobotsError
 from softrobots.identification.model_change import CENTRAL, scales_of
 from softrobots.identification.parameters import ParameterSet
 from softrobots.model.serial_chain import SerialChain
+
+Read = Callable[[str], FloatArray]
+"""Returns words of a description as columns, shape (N or 1, words)."""
 
 
 def many_numbers(parameters: ParameterSet, rows: FloatArray, loaded: Callable[[Any], FloatArray]) -> FloatArray:
@@ -58,19 +61,34 @@ def many_slopes(
     return found[0], np.moveaxis(by_step, 0, 2) / steps[:, None, :]
 
 
-def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read: Callable[[str], FloatArray]) -> FloatArray:
-    """Return the numbers of chains that differ in numbers of their text, shape (N, n), in the order of `numbers_of`.
-
-    Placements `(R, p)` are composed along fixed joints, and masses `m` with centres `c` added where they are fixed:
-    `m (R c + p)` is the first moment. `read` returns words of the description as columns, shape (N or 1, words).
-    """
+def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read: Read) -> FloatArray:
+    """Return the numbers of chains that differ in numbers of their text, shape (N, n), in the order of `numbers_of`."""
     elements: Any = chain.elements
-    rows = {one.name: row for row, one in enumerate(elements)}
     axes = [one.axes for one in elements] + [np.eye(3)]  # the last is the world's
-    above: dict[Any, Any] = {joint.find("child").get("link"): joint for joint in root.findall("joint")}  # type: ignore[union-attr]
-    places: list[list[FloatArray]] = [[] for _ in elements]
-    masses = [[read("0"), read("0 0 0")] for _ in axes]
+    places, masses, placed = tree_columns(root, [one.name for one in elements], axes, read)
     springs = [[read(str(one)) for one in pair] for pair in zip(chain.stiffness, chain.rest, strict=True)]
+    strains = {one.name: one.strain for one in elements if one.strain is not None}
+    for joint in root.findall("joint"):
+        for spring in joint.findall("{*}spring") if joint.get("name") in strains else ():
+            springs[strains[joint.get("name")]] = [read(spring.get(name, "0")) for name in ("stiffness", "rest")]
+    row, _, translation = placed(tip)
+    parts = [one.T for one in chain_of(*places, [translation @ axes[row]], *zip(*springs, strict=True), *masses[:-1])]
+    return np.stack(np.broadcast_arrays(*chain_of(*parts)), axis=1)
+
+
+def tree_columns(
+    root: ElementTree.Element, joints: Sequence[str], axes: Sequence[FloatArray], read: Read
+) -> tuple[list[list[FloatArray]], list[list[FloatArray]], Callable[[str | None], tuple[int, FloatArray, FloatArray]]]:
+    """Return placements and masses of joints of trees that differ in numbers of their text, and what places a link.
+
+    Placements `(R, p)`, in the joint before, are composed along fixed joints, and masses `m` with centres `c` added where they
+    are fixed: `m (R c + p)` is the first moment. `axes` turn the frames of the joints, and of the world, which is the last.
+    Links are placed by the row of the joint that they are fixed to, -1 for the world, and the placement there.
+    """
+    rows = {name: row for row, name in enumerate(joints)}
+    above: dict[Any, Any] = {joint.find("child").get("link"): joint for joint in root.findall("joint")}  # type: ignore[union-attr]
+    places: list[list[FloatArray]] = [[] for _ in joints]
+    masses = [[read("0"), read("0 0 0")] for _ in axes]
 
     def origin(element: ElementTree.Element, name: str) -> FloatArray:
         given = element.find("origin")
@@ -78,7 +96,6 @@ def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read:
 
     @cache
     def placed(link: str | None) -> tuple[int, FloatArray, FloatArray]:
-        """Row of the joint that a link is fixed to, -1 for the world, and its placement there."""
         joint = above.get(link)
         if joint is None:
             return -1, np.eye(3)[None], np.zeros((1, 3))
@@ -89,8 +106,6 @@ def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read:
         if own is None:
             return row, rotation, translation
         places[own] = [(axes[row].T @ rotation @ axes[own]).reshape(-1, 9), translation @ axes[row]]
-        for spring in joint.findall("{*}spring") if elements[own].strain is not None else ():
-            springs[elements[own].strain] = [read(spring.get(name, "0")) for name in ("stiffness", "rest")]
         return own, np.eye(3)[None], np.zeros((1, 3))
 
     for link in root.findall("link"):
@@ -100,6 +115,4 @@ def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read:
             mass[mass < 0.0] = np.nan  # the loader refuses it
             moment = mass * (np.einsum("nij,nj->ni", rotation, origin(inertial, "xyz")) + translation) @ axes[row]
             masses[row] = [masses[row][0] + mass, masses[row][1] + moment]
-    row, _, translation = placed(tip)
-    parts = [one.T for one in chain_of(*places, [translation @ axes[row]], *zip(*springs, strict=True), *masses[:-1])]
-    return np.stack(np.broadcast_arrays(*chain_of(*parts)), axis=1)
+    return places, masses, placed

@@ -64,11 +64,8 @@ def assemble(
     """
     motor_joints, spring_joints = (tuple(sorted(names, key=rigid.getJointId)) for names in (motors, springs))
     motor_indices, spring_indices = velocity_indices(rigid, motor_joints), velocity_indices(rigid, spring_joints)
-    section_tags = sorted(tags.sections, key=lambda tag: rigid.getJointId(tag.joints[0]))
-    lumped_tags = sorted(tags.lumped_sections, key=lambda tag: rigid.getJointId(tag.joints["bend_x"]))
-    sections = _section_rows(section_tags, first=len(spring_joints))
-    rows = sections or [_lumped_row(tag, spring_joints) for tag in lumped_tags]
-    strain_springs = _strain_springs(rigid, [springs[name] for name in spring_joints], spring_joints, section_tags)
+    rows, strain_springs = elastic_parts(rigid, tags, springs, spring_joints)
+    sections = rows if tags.sections else []
     muscles = actuators_of(tags.muscles, muscle_input)
     paths = MusclePaths(muscles, rows, len(strain_springs.names))
 
@@ -135,6 +132,16 @@ def assemble(
         reach=chain_length(rigid, data.frame_ids[tip], inside) if like is None else like.reach,
         robot=robot,
     )
+
+
+def elastic_parts(
+    rigid: Any, tags: RobotTags, springs: Mapping[str, SpringTag], spring_joints: tuple[str, ...]
+) -> tuple[list[SectionRow], Springs]:
+    """Return the sections, base to tip, and the springs of all strains; joints are found in the rigid bodies."""
+    section_tags = sorted(tags.sections, key=lambda tag: rigid.getJointId(tag.joints[0]))
+    lumped_tags = sorted(tags.lumped_sections, key=lambda tag: rigid.getJointId(tag.joints["bend_x"]))
+    rows = _section_rows(section_tags, len(spring_joints)) or [_lumped_row(tag, spring_joints) for tag in lumped_tags]
+    return rows, _strain_springs(rigid, [springs[name] for name in spring_joints], spring_joints, section_tags)
 
 
 def actuators_of(tags: Sequence[ActuatorTag], muscle_input: str | None) -> tuple[ActuatorTag, ...]:

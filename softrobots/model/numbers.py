@@ -14,6 +14,7 @@ from softrobots.core.checks import FloatArray
 from softrobots.model.actuator_laws import pull_factors
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import SpringGroup, Springs
+from softrobots.model.structure import Structure
 
 Numbers = dict[str, FloatArray]
 """Arrays by name, see `model_numbers`."""
@@ -29,18 +30,25 @@ def model_numbers(model: SoftModel) -> Numbers:
     `path_rest`, `straightened` and `laws` (n_muscles, ...): of actuators, see `LAW`; `held_slopes` and `held_elastic`: of
     `MuscleLengths`; `bending_friction` and `guide_friction`: of `DryFriction`.
     """
-    rigid, structure, held = model.pinocchio, model.structure, model.structure.muscle_lengths
-    paths, springs, friction = structure.muscle_paths, structure.strain_springs, structure.friction
+    rigid = model.pinocchio
     bodies = [(one.mass, *(one.mass * one.lever)) for one in list(rigid.inertias)[1:]]
-    sections = structure.section_table if structure.constant_strain else ()
-    laws = [(one.stiffness, one.pretension, one.area, *_pull(one), one.rest_length) for one in structure.muscles]
     return {
         "placements": np.array([one.homogeneous[:3] for one in list(rigid.jointPlacements)[1:]]).reshape(-1, 3, 4),
         "frames": np.array([one.placement.homogeneous[:3] for one in rigid.frames]),
         "masses": np.array(bodies).reshape(-1, 4),
+        "moments": np.array([one.linear_up_to or 0.0 for one in strain_springs(model).groups]),
+        **structure_numbers(model.structure),
+    }
+
+
+def structure_numbers(structure: Structure) -> Numbers:
+    """Return those of `model_numbers` that are neither of rigid bodies nor moments."""
+    paths, springs, friction = structure.muscle_paths, structure.strain_springs, structure.friction
+    sections, held = structure.section_table if structure.constant_strain else (), structure.muscle_lengths
+    laws = [(one.stiffness, one.pretension, one.area, *_pull(one), one.rest_length) for one in structure.muscles]
+    return {
         "stiffness": springs.stiffness,
         "rest": springs.rest,
-        "moments": np.array([one.linear_up_to or 0.0 for one in strain_springs(model).groups]),
         "section_lengths": np.array([row.bends for row in sections]),
         "section_joints": np.array([row.rest_joints for row in sections]).reshape(-1, 6),
         "path_length": paths.length,
