@@ -109,27 +109,32 @@ def identify(
 
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
-    last: Stage = "whole" if in_order else "last"  # few rows of friction come by another way
+    calm, weights = chosen.frictionless(), None
+    stages: list[tuple[ParameterSet, int, Stage]] = [(chosen, 1, "whole" if in_order else "last")]
+    stages[:0] = [(calm, 1, "last")] * (calm is not chosen)
+    stages[:0] = [(calm, every, "first")] * (every > 1 and _sees_all(rows, counted, every))
     with one_blas_thread(1000):
-        predictor = Predictor(chosen, rows)
-        few = Predictor(chosen, rows[::every]) if every > 1 and _sees_all(rows, counted, every) else predictor
-        counted_few = counted if few is predictor else counted[::every]
-        values[0] = mounted(few, values[0], counted_few)
-        weights = Weights.of(few.measurements.std, few.at(values[0]).differences(), counted_few)
-        if not len(weights.rows()):
-            raise ParameterError("measurements", measurements, "with at least one number in a row that counts")
-        robust = loss if weights.known else "linear"
-        if few is not predictor:
-            quick = _best(few, weights, prior, robust, steps, values, most, "first")
-            values, message = [quick.values], quick.message
-            weights = weights.of_more(rows.std, predictor.at(quick.values).differences(), counted)
-        most_left, stage = 0 if message == INTERRUPTED else most, "whole" if few is predictor else last
-        best = _best(predictor, weights, prior, robust, steps, values, most_left, stage)
+        for own, step, stage in stages:
+            try:
+                predictor, some = Predictor(own, rows[::step] if step > 1 else rows), counted[::step]
+                if weights is None:
+                    values[0], stage = mounted(predictor, values[0], some), "first" if step > 1 else "whole"
+                weigh = Weights.of if weights is None else weights.of_more
+                weights = weigh(predictor.measurements.std, predictor.at(values[0]).differences(), some)
+                if not len(weights.rows()):
+                    raise ParameterError("measurements", measurements, "with at least one number in a row that counts")
+                robust, left = loss if weights.known else "linear", 0 if message == INTERRUPTED else most
+                best = _best(predictor, weights, prior, robust, steps, values, left, stage)
+                values, message = [best.values], message if message == INTERRUPTED else best.message
+            except SoftRobotsError:
+                if own is chosen:
+                    raise
         again = not weights.known and (loss != "linear" or len(weights.std) > 1)
-        if again and INTERRUPTED not in (message, best.message) and best.cost > _PERFECT * len(weights.rows()):
+        if again and message != INTERRUPTED and best.cost > _PERFECT * len(weights.rows()):
             weights = weights.estimated(best.at_end()[0].differences())
-            best = _best(predictor, weights, prior, loss, steps, [best.values], most, last)
-        best.message = message if message == INTERRUPTED else best.message
+            best = _best(predictor, weights, prior, loss, steps, [best.values], most, stages[-1][2])
+            message = best.message
+        best.message = message
         return identification_of(best, others)
 
 

@@ -17,9 +17,9 @@ from softrobots.core.errors import NameNotFound, ParameterError
 from softrobots.model.soft_model import SoftModel
 from softrobots.robots.fields import Facts
 
-Kind = Literal["field", "spring", "base", "marker", "offset", "motor", "force", "wrench", "gravity"]
+Kind = Literal["field", "spring", "base", "marker", "offset", "motor", "force", "wrench", "gravity", "idle"]
 """What a parameter changes: a field of the dataclass, joint springs, the pose of the base, a marker, motor offsets; or, where
-derivatives are asked for, an actuator coordinate, a load or gravity."""
+derivatives are asked for, an actuator coordinate, a load or gravity; or nothing, of friction that is left out."""
 
 LOADS: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "force": ("N", ("force.x", "force.y", "force.z")),

@@ -30,7 +30,7 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray, finite_array, read_only
 from softrobots.core.errors import ParameterError
-from softrobots.identification.parameter_names import Kind, Parameter, Registry
+from softrobots.identification.parameter_names import Kind, Parameter, Place, Registry
 from softrobots.model.loader import load_arguments, load_model, with_springs
 from softrobots.model.numbers import Numbers, model_numbers
 from softrobots.model.soft_model import SoftModel
@@ -203,6 +203,16 @@ class ParameterSet:
                 stiffness, rest = springs[joint]
                 springs[joint] = (stiffness, values[number]) if one.place.parts[0] else (values[number], rest)
         return with_springs(model, springs) if self.places("spring") else model
+
+    def frictionless(self) -> ParameterSet:
+        """The same parameters of the robot without its dry friction, whose own change nothing; itself if no field has any."""
+        robot, friction = self.present.robot, ("bending_friction", "guide_friction")
+        if self.present.structure.friction is None or not any(hasattr(robot, name) for name in friction):
+            return self
+        fields = {name: 0.0 for name in friction if hasattr(robot, name)}
+        idle = {one.name for _, one in self.places("field") if one.place.names[0] in fields}
+        others = [replace(one, place=Place("idle")) if one.name in idle else one for one in self.parameters]
+        return replace(self, present=load_model(replace(robot, **fields), **self._load_arguments), parameters=tuple(others))
 
     def base(self, values: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return position [m] and rotation vector [rad] of the base in the frame of the measurements, each shape (3,)."""

@@ -246,10 +246,11 @@ class Predictor:
         """Search some rows from the equilibria of the values before, then from rest or the row before; appends sliders."""
         now, before, cases = untouched(model), np.asarray(model.rest), load_cases(loads, len(motors)) if len(rows) else []
         for row in rows.tolist():
-            state = None
+            state, starts = None, [before] if self._springs is None else [self._springs[row], before]
             if self.in_order:
                 sliders.append(memory_of(now).bending)
-            for start in (self._springs[row], before) if self._springs is not None else (before,):
+                starts[:-1] = [before + one - self._springs[max(row - 1, 0)] for one in starts[:-1]]  # type: ignore[index]
+            for start in starts:  # with memory as far from the row before as it was: what stuck still sticks
                 state = state or balanced_state(now, motors[row], cases[row], start, tolerance=_TOLERANCE)
             if state is not None and self.in_order:
                 now, before = after_step(now, motors[row], state.q_springs), state.q_springs

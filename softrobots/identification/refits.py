@@ -15,12 +15,14 @@ from typing import Any
 
 import numpy as np
 
+from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
 from softrobots.core.progress import with_progress
 from softrobots.identification.identification import Identification
-from softrobots.identification.identify import identify
+from softrobots.identification.identify import identify, mounted
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
+from softrobots.identification.prediction import Predictor
 
 STEPS = 20
 """Most steps of such a fit."""
@@ -46,6 +48,7 @@ _LOADS = (
 """Ratios of numbers of loads in one unit to those in another that it is mistaken for, and how near a ratio is to be."""
 _TOLD = 0.2  # largest standard error of the logarithm of a stiffness that tells a unit
 _FORCES = ("force", "wrench")
+_TOLD_APART = 1e-3  # singular value, relative, of a combination of parameters in a linear step
 _OFF = math.log(2.0)  # change of a stiffness, as a logarithm, above which loads are doubted
 
 
@@ -81,6 +84,49 @@ def other_loads(found: Identification, key: str, few: slice, progress: bool | st
         f"{key}: {words}, and fitting again, leaves residuals of {size:.2g} of the size: a load is what acts on the robot"
         for words, size in _better(found, key, few, {words: one for words, one in changes.items() if one}, progress)
     ]
+
+
+def reversed_actuators(found: Identification, key: str, few: slice, progress: bool | str) -> list[tuple[str, float, float]]:
+    """The signs of actuators that explain most of positions, and the share of the variance that they and those given leave.
+
+    Each choice of signs counts by what one linear step of all parameters within their priors would leave, from where the fit
+    started but for the pose of the base, and without dry friction. One sign after another is changed, or all of them at once
+    (which looks like half a turn of the base until tendons go slack), for the change that leaves least.
+    """
+    rows = found.fitted.measurements[few]
+    start, names, n = _at_start(found), found.names, rows.q_motors.shape[1]
+    if Predictor(start, rows).by_differences:  # which would take minutes
+        return []
+    points, middle = rows.measured[key], 0.0 if rows.relative else start.present.relaxed_motors
+    points = points[:, :3, 3] if points.ndim == 3 else points
+    whole = float(np.nansum((points - np.nanmean(points, axis=0)) ** 2))
+    noise = float(np.nanmedian(rows.std[key])) if key in rows.std else math.sqrt(float(np.nanmean(found.residuals[key] ** 2)))
+    means, stds = np.reshape([found.priors.get(name, (0.0, np.inf)) for name in names], (-1, 2)).T
+    known, slopes_known = noise * (means - start.values) / stds, -noise * np.diag(1.0 / stds)
+
+    def left(signs: FloatArray) -> float:
+        try:
+            predictor = Predictor(
+                start, Measurements(**rows.arguments() | {"q_motors": middle + (rows.q_motors - middle) * signs})
+            )
+            values = mounted(predictor, start.values, rows.mask)
+            predictor.refresh(start.values)  # the pose of the base changes nothing of the robot
+            one = predictor.at(values).seen[key]
+            error, slopes = one.difference[:, :3], one.slopes()[:, :3]
+        except SoftRobotsError:
+            return math.inf
+        error, slopes = np.append(error[np.isfinite(error)], known), np.vstack([slopes[np.isfinite(error)], slopes_known])
+        slopes /= np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
+        return float(np.sum((error - slopes @ np.linalg.lstsq(slopes, error, rcond=_TOLD_APART)[0]) ** 2)) / whole
+
+    signs, shares = np.ones(n), [left(np.ones(n))]
+    for _ in with_progress(range(n), progress, label="signs of the actuators", unit="change"):
+        tried = [-signs, *(signs * np.where(np.arange(n) == place, -1.0, 1.0) for place in range(n))]
+        each = [left(one) for one in tried]
+        if not min(each) < shares[-1]:
+            break
+        signs, shares = tried[int(np.argmin(each))], [*shares, min(each)]
+    return [(", ".join(str(int(number * sign)) for number, sign in enumerate(signs, start=1)), shares[-1], shares[0])]
 
 
 def load_units(found: Identification) -> list[str]:
@@ -130,10 +176,9 @@ def _better(
     found: Identification, key: str, few: slice, changes: Mapping[str, Mapping[str, Any]], progress: bool | str
 ) -> Iterator[tuple[str, float]]:
     """Yield the change of the measurements with which a fit leaves far less, if one does, and what it leaves, relative."""
-    rows, chosen = found.fitted.measurements[few], ParameterSet.of(found.model, found.names, found.fitted.measurements.markers)
+    rows, start = found.fitted.measurements[few], _at_start(found)
     own = float(np.nansum(found.residuals[key][few] ** 2))
     freedoms = np.count_nonzero(np.isfinite(found.residuals[key][few])) - len(found.names)
-    start = ParameterSet.of(chosen.model([one.value for one in found.parameters]), found.names, rows.markers)
     options: dict[str, Any] = {"priors": found.priors, "loss": found.loss, "max_iterations": STEPS}
     left = dict[str, float]()
     shown = progress if changes else False
@@ -146,3 +191,10 @@ def _better(
     words = min(left, key=left.__getitem__, default="")
     if left and own > 2.0 * left[words] and freedoms * (own - left[words]) > _SIGNIFICANT * left[words]:
         yield words, math.sqrt(left[words] / own)
+
+
+def _at_start(found: Identification) -> ParameterSet:
+    """The parameters of the robot from which a fit started, without dry friction, which would make each of many fits slow."""
+    chosen = ParameterSet.of(found.model, found.names, found.fitted.measurements.markers)
+    start = chosen.model([one.value for one in found.parameters])
+    return ParameterSet.of(start, found.names, chosen.markers).frictionless()

@@ -15,13 +15,11 @@ import numpy as np
 import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
-from softrobots.core.errors import SoftRobotsError
 from softrobots.identification.identification import Identification
-from softrobots.identification.identify import mounted
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
-from softrobots.identification.refits import load_units, other_axes, other_loads, rescaled, value_units
+from softrobots.identification.refits import load_units, other_axes, other_loads, rescaled, reversed_actuators, value_units
 from softrobots.model.soft_model import SoftModel, check_model
 
 FACTORS = (
@@ -42,7 +40,6 @@ FAR_LESS = 0.25
 
 _FEWEST = 4  # rows
 _MOST_SOLVED = 50  # rows in which other frames are tried
-_TOLD_APART = 1e-3  # singular value, relative, of a combination of parameters in a linear step
 _SAME_FACTOR = math.log(1.5)  # a ratio of sizes this near to one of FACTORS; other parameters are not right yet either
 _MUCH = 0.1  # share of the variance that no robot with the right columns leaves
 _TO_STD = 1.4826  # standard deviation of normal numbers over the median of their size
@@ -68,7 +65,11 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
         left = _unexplained(measured[others], predicted[others])
         if key.startswith(("positions.", "poses.")) and left > UNEXPLAINED:
             texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
-            texts += _reversed_actuators(found, key, few) if len(texts) == before else []
+            for order, after, start in reversed_actuators(found, key, few, progress) if len(texts) == before else ():
+                if start > UNEXPLAINED and after < FAR_LESS * start:
+                    texts.append(
+                        f"{key}: taking the actuators as {order} {_words(after, start)}, after a linear step of the fit"
+                    )
             texts += other_axes(found, key, few, progress) if len(texts) == before else []
         if key.startswith(("positions.", "poses.")) and (left > UNEXPLAINED or rescaled(found)) and not texts:
             texts += other_loads(found, key, few, progress)
@@ -205,48 +206,6 @@ def _other_frame(found: Identification, key: str, rows: Measurements, before: fl
     if shares[best] >= FAR_LESS * before:
         return []
     return [f"{key}: taking it for the frame {best} {_words(shares[best], before)}"]
-
-
-def _reversed_actuators(found: Identification, key: str, few: slice) -> list[str]:
-    """The actuators whose reversal explains far more of positions, if any are: what else is fitted hides them.
-
-    Each choice of signs counts by what one linear step of all parameters would leave, from where the fit started but for the
-    pose of the base. One sign after another is changed for the one that leaves least.
-    """
-    rows = found.fitted.measurements[few]
-    chosen = ParameterSet.of(found.model, found.names, rows.markers)
-    start = ParameterSet.of(chosen.model([one.value for one in found.parameters]), found.names, rows.markers)
-    n, middle = rows.q_motors.shape[1], 0.0 if rows.relative else start.present.relaxed_motors
-    points = _points(rows.measured[key])
-    whole = float(np.sum(_centred(points[_known(points, points)]) ** 2))
-    if Predictor(start, rows).by_differences:  # which would take minutes
-        return []
-
-    def left(signs: FloatArray) -> float:
-        given = rows.arguments() | {"q_motors": middle + (rows.q_motors - middle) * signs}
-        try:
-            predictor = Predictor(start, Measurements(**given))
-            values = mounted(predictor, start.values, rows.mask)
-            predictor.refresh(values)
-            one = predictor.at(values).seen[key]
-            error, slopes = one.difference[:, :3], one.slopes()[:, :3]
-        except SoftRobotsError:
-            return math.inf
-        error, slopes = error[np.isfinite(error)], slopes[np.isfinite(error)]
-        slopes /= np.maximum(np.linalg.norm(slopes, axis=0), 1e-300)
-        return float(np.sum((error - slopes @ np.linalg.lstsq(slopes, error, rcond=_TOLD_APART)[0]) ** 2)) / whole
-
-    signs, shares = np.ones(n), [left(np.ones(n))]
-    while len(shares) <= n:
-        tried = [signs * np.where(np.arange(n) == place, -1.0, 1.0) for place in range(n)]
-        each = [left(one) for one in tried]
-        if not min(each) < shares[-1]:
-            break
-        signs, shares = tried[int(np.argmin(each))], [*shares, min(each)]
-    if not (shares[0] > UNEXPLAINED and shares[-1] < FAR_LESS * shares[0]):
-        return []
-    order = ", ".join(str(int(number * sign)) for number, sign in enumerate(signs, start=1))
-    return [f"{key}: taking the actuators as {order} {_words(shares[-1], shares[0])}, after a linear step of the fit"]
 
 
 def _points(values: FloatArray) -> FloatArray:
