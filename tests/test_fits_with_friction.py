@@ -57,10 +57,12 @@ def test_derivatives_go_through_what_friction_remembers(rng: np.random.Generator
 
 
 def test_rows_that_stuck_are_found_at_once_at_other_values(rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch) -> None:
-    """From the course at values 2 % off: the same equilibria as from rest, in at most 4 evaluations a row in the mean."""
-    arm, measured = wandering(rng, 30, bending_friction=1e-2)
+    """Movements there and back, values 1 % off: the same equilibria as from rest, in three evaluations a row in the mean."""
+    arm, ramp = sr.TendonArm(**{**ARM, "bending_friction": 1e-2}), np.r_[0.0:1.0:6j, 1.0:0.0:6j]
+    pulls = np.concatenate([np.outer(ramp, pull) for pull in rng.uniform(-2e-3, 8e-3, (4, 6))])
+    measured = sr.Measurements(pulls, tip_position=np.zeros((48, 3)), relative=True, markers={"tip": "tip"})
     parameters, spent = ParameterSet.of(arm, NAMES, measured.markers), list[int]()
-    values = parameters.values * (1.0 + 0.02 * rng.standard_normal(len(parameters.values)))
+    values = parameters.values * (1.0 + 0.01 * rng.standard_normal(len(parameters.values)))
     search = elastostatics.solve_springs
 
     def counted(*arguments: Any, **options: Any) -> Any:
@@ -72,7 +74,7 @@ def test_rows_that_stuck_are_found_at_once_at_other_values(rng: np.random.Genera
     predictor.at(parameters.values)
     monkeypatch.setattr(elastostatics, "solve_springs", counted)
     assert np.abs(predictor.at(values).at.strains - anew.at.strains).max() < 1e-8
-    assert np.mean(spent) < 4.0
+    assert np.mean(spent) < 3.0
 
 
 def test_a_robot_without_its_friction_has_the_parameters_but_those_change_nothing(rng: np.random.Generator) -> None:

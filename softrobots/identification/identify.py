@@ -109,16 +109,17 @@ def identify(
 
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
-    calm, weights = chosen.frictionless(), None
+    calm, weights, near = chosen.frictionless(), None, None
     stages: list[tuple[ParameterSet, int, Stage]] = [(chosen, 1, "whole" if in_order else "last")]
-    stages[:0] = [(calm, 1, "last")] * (calm is not chosen)
+    stages[:0] = [(calm, 1, "first")] * (calm is not chosen)
     stages[:0] = [(calm, every, "first")] * (every > 1 and _sees_all(rows, counted, every))
+    stages = stages if len(stages) > 1 else [(chosen, 1, "whole")]
     with one_blas_thread(1000):
         for own, step, stage in stages:
             try:
-                predictor, some = Predictor(own, rows[::step] if step > 1 else rows), counted[::step]
+                predictor, some = Predictor(own, rows[::step] if step > 1 else rows, near=near), counted[::step]
                 if weights is None:
-                    values[0], stage = mounted(predictor, values[0], some), "first" if step > 1 else "whole"
+                    values[0] = mounted(predictor, values[0], some)
                 weigh = Weights.of if weights is None else weights.of_more
                 weights = weigh(predictor.measurements.std, predictor.at(values[0]).differences(), some)
                 if not len(weights.rows()):
@@ -126,6 +127,7 @@ def identify(
                 robust, left = loss if weights.known else "linear", 0 if message == INTERRUPTED else most
                 best = _best(predictor, weights, prior, robust, steps, values, left, stage)
                 values, message = [best.values], message if message == INTERRUPTED else best.message
+                near = best.at_end()[0].at.states.q_springs if step == 1 and own is not chosen else None
             except SoftRobotsError:
                 if own is chosen:
                     raise

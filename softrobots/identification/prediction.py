@@ -160,8 +160,8 @@ class Prediction:
 class Predictor:
     """Predictions of measured rows for values of parameters."""
 
-    def __init__(self, parameters: ParameterSet, measurements: Measurements, *, gaps: bool = False) -> None:
-        """Check that the measurements can be those of the robot; `gaps` says whether rows may lack an equilibrium.
+    def __init__(self, parameters: ParameterSet, measurements: Measurements, *, gaps: bool = False, near: Any = None) -> None:
+        """Check the measurements; `gaps`: whether rows may lack an equilibrium; `near`: strains to search from, if known.
 
         Raises:
             ParameterError: If they are not, see `Measurements.check`.
@@ -178,7 +178,7 @@ class Predictor:
         """Derivatives of the model's numbers, as `refresh` left them."""
         self.actuator_slopes = parameters.offset_slopes
         """Derivatives of the actuators by the parameters, shape (n_motors, P)."""
-        self._springs: FloatArray | None = None
+        self._springs: FloatArray | None = near
         self.gaps, self.lost = gaps, list[int]()
         self._last: Prediction | None = None
         self._solved: dict[bytes, tuple[States, FloatArray | None]] = {}
