@@ -24,6 +24,8 @@ from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
 
+UNEXPLAINED = 0.02
+"""Share of the variance above which a fit is suspected: residuals of a seventh of the motion."""
 STEPS = 20
 """Most steps of such a fit."""
 
@@ -120,7 +122,7 @@ def reversed_actuators(found: Identification, key: str, few: slice, progress: bo
         return float(np.sum((error - slopes @ np.linalg.lstsq(slopes, error, rcond=_TOLD_APART)[0]) ** 2)) / whole
 
     signs, shares = np.ones(n), [left(np.ones(n))]
-    for _ in with_progress(range(n), progress, label="signs of the actuators", unit="change"):
+    for _ in with_progress(range(n if shares[0] > UNEXPLAINED else 0), progress, label="signs of the actuators", unit="change"):
         tried = [-signs, *(signs * np.where(np.arange(n) == place, -1.0, 1.0) for place in range(n))]
         each = [left(one) for one in tried]
         if not min(each) < shares[-1]:

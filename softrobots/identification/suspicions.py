@@ -19,7 +19,15 @@ from softrobots.identification.identification import Identification
 from softrobots.identification.measurements import Measurements
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
-from softrobots.identification.refits import load_units, other_axes, other_loads, rescaled, reversed_actuators, value_units
+from softrobots.identification.refits import (
+    UNEXPLAINED,
+    load_units,
+    other_axes,
+    other_loads,
+    rescaled,
+    reversed_actuators,
+    value_units,
+)
 from softrobots.model.soft_model import SoftModel, check_model
 
 FACTORS = (
@@ -33,8 +41,6 @@ FACTORS = (
 )
 """Ratios of units that are mistaken for each other: so many of the first are one of the second."""
 
-UNEXPLAINED = 0.02
-"""Share of the variance above which a fit is suspected: residuals of a seventh of the motion."""
 FAR_LESS = 0.25
 """What a remedy must leave of it to be told: residuals of at most half the size."""
 
@@ -56,22 +62,25 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
         progress: Whether to show a bar where fits are tried, or its label.
     """
     rows = found.fitted.measurements
-    texts = load_units(found)
+    texts, far = load_units(found), _far_from_priors(found)
     few = slice(None, None, -(-len(rows) // _MOST_SOLVED))
     for key, values in found.fitted.predicted.items():
         measured, predicted, before = _points(rows.measured[key]), _points(values), len(texts)
         others = np.delete(np.arange(len(rows)), found.outliers)  # single mistakes are no reason to fit again
         texts += suspicions(measured, predicted, rows.q_motors, name=key)
         left = _unexplained(measured[others], predicted[others])
-        if key.startswith(("positions.", "poses.")) and left > UNEXPLAINED:
+        placed, bad = key.startswith(("positions.", "poses.")), left > UNEXPLAINED
+        if placed and bad:
             texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
-            for order, after, start in reversed_actuators(found, key, few, progress) if len(texts) == before else ():
+        if placed and (bad or far) and len(texts) == before:  # values far from what was known may hide reversed actuators
+            for order, after, start in reversed_actuators(found, key, few, progress):
                 if start > UNEXPLAINED and after < FAR_LESS * start:
                     texts.append(
                         f"{key}: taking the actuators as {order} {_words(after, start)}, after a linear step of the fit"
                     )
+        if placed and bad:
             texts += other_axes(found, key, few, progress) if len(texts) == before else []
-        if key.startswith(("positions.", "poses.")) and (left > UNEXPLAINED or rescaled(found)) and not texts:
+        if placed and (bad or rescaled(found)) and not texts:
             texts += other_loads(found, key, few, progress)
         share = _unexplained(measured, predicted)
         if len(texts) == before and left > _MUCH:
@@ -89,7 +98,7 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
                     f"{key}: what is left is {ratio:.2g} times the standard deviation that was given: the robot differs in "
                     f"what is not fitted{weight}, or the standard deviation is larger; the intervals by rows are too narrow"
                 )
-    return (texts or value_units(found)) + _far_from_priors(found) + _tied(found)
+    return (texts or value_units(found)) + far + _tied(found)
 
 
 def suspicions(
