@@ -188,7 +188,7 @@ def _far_from_priors(found: Identification) -> list[str]:
     far = sorted((name for name in off if abs(off[name]) > _FAR), key=lambda name: -abs(off[name]))
     if not far:
         return []
-    named = ", ".join(f"{name} {off[name]:+.2g}" for name in far[:6]) + f" and {len(far) - 6} more" * bool(far[6:])
+    named = ", ".join(f"{name} {off[name]:+.2g}" for name in far[:6]) + (f" and {len(far) - 6} more" if far[6:] else "")
     return [
         f"far from what was known before, in standard deviations of the prior: {named}; are the sizes of the robot and the "
         "priors right, and order and sign of the actuators?"

@@ -30,6 +30,7 @@ from softrobots.learning.varied_chains import VariedChains
 from softrobots.model.soft_model import SoftModel
 
 _AT_ONCE = 16  # robots whose derivatives are found at once
+_KEPT = 1 << 10  # robots that stay loaded from values to gradient, of some 0.4 MB each
 _SIZE = 1 << 20  # numbers of the twists of a chunk of cases
 
 
@@ -40,7 +41,7 @@ class GeneralSolver:
         """Take the parameters, and compiled solvers for the equilibria of the robot as it is."""
         self._parameters, self._weight, self._compiled = parameters, weight, compiled
         self._varied = None if compiled is None or compiled.unknowns.is_unrolled else VariedChains(compiled, parameters)
-        self._at = lru_cache(maxsize=1 << 12)(self._model)
+        self._at = lru_cache(maxsize=_KEPT)(self._model)
         self._recorded, self._changes = RecordedModels(parameters), dict[tuple[float, ...], ModelChange]()
 
     def read(self, each: Sequence[tuple[float, ...]], *, slopes: bool) -> None:

@@ -65,9 +65,9 @@ class RecordedModels:
             own, left = left[same].tolist(), left[~same]
             if not own:
                 continue
-            told = _numbers_like(self._like, tape.marked, tape.read_many(np.concatenate(fields[own]))[1], len(own) * size)
+            numbers_at = _numbers_like(self._like, tape.marked, tape.read_many(np.concatenate(fields[own]))[1], len(own) * size)
             for first, row in enumerate(own):
-                base, near = numbers_of(models[row]), [told(first * size + number) for number in range(size)]
+                base, near = numbers_of(models[row]), [numbers_at(first * size + number) for number in range(size)]
                 alike = all(one[name].shape == base[name].shape for one in near for name in base)
                 if not alike or not all(np.allclose(near[-1][name], base[name], 1e-11, 1e-13) for name in base):
                     continue
@@ -131,9 +131,9 @@ def _numbers_like(model: SoftModel, marked: str, read: Read, count: int) -> Call
         new: Any = {"section_table": tuple(table), "strain_springs": strains, "muscles": muscles, "muscle_paths": paths}
         return structure_numbers(replace(structure, **new, muscle_lengths=lengths))
 
-    def told(row: int) -> Numbers:
+    def numbers_at(row: int) -> Numbers:
         if keys[row] not in made:
             made[keys[row]] = of_structure(row)
         return {"moments": numbers_of(model)["moments"], **{name: one[row] for name, one in columns.items()}, **made[keys[row]]}
 
-    return told
+    return numbers_at

@@ -41,15 +41,15 @@ def settle_middle(w: Array) -> bool:
         first = 0
         w[SPARE] = 0.0
     renewed = 0.0
-    made = 0.0
+    factored = 0.0
     slow = 0.0
     w[LAST_CHANGE] = 1e300
     for step in range(MOTION_CORRECTIONS):
         if slow > 0.5 or (step == first and w[SPARE] < 0.5):
             w[SPARE] = 0.0
-            w[COUPLED] = where(slow * made > 0.5, 1.0, COUPLED_FADES * w[COUPLED])
+            w[COUPLED] = where(slow * factored > 0.5, 1.0, COUPLED_FADES * w[COUPLED])
             renewed = 1.0 - slow
-            made = 1.0
+            factored = 1.0
             motion_factor(w)
         else:
             motion_correct(w)

@@ -58,14 +58,14 @@ def settle_middle_lanes(w: Array, n_history: int) -> None:
         w[SPARE * LANES] = 0.0
     fill_lanes(w, LAST_CHANGE, 1e300)
     renewed = 0.0
-    made = 0.0
+    factored = 0.0
     slow = 0.0
     for step in range(MOTION_CORRECTIONS):
         if slow > 0.5 or (step == first and w[SPARE * LANES] < 0.5):
             w[SPARE * LANES] = 0.0
-            fill_lanes(w, COUPLED, where(slow * made > 0.5, 1.0, COUPLED_FADES * w[COUPLED * LANES]))
+            fill_lanes(w, COUPLED, where(slow * factored > 0.5, 1.0, COUPLED_FADES * w[COUPLED * LANES]))
             renewed = 1.0 - slow
-            made = 1.0
+            factored = 1.0
             motion_factor_lanes(w)
         else:
             motion_correct_lanes(w)
