@@ -25,12 +25,6 @@ OVERSHOT = friction_steps.OVERSHOT
 RENEW_SHARE = 0.2
 """Share of the last change, above which the factors of a step are computed again: tendons go slack, or the body swings far."""
 
-FACTORS_COST = 1.5
-"""Corrections that cost as much as factors of a step of fourth order of a rod, by which they are kept for later steps."""
-
-COUPLED_FADES = 0.98
-"""By what a mark of 1 for a matrix of each stage shrinks as factors are computed; below a half one for both is tried again."""
-
 LEAST_PART = 2.0**-12
 """Smallest part of a step of time."""
 

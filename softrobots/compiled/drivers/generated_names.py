@@ -87,7 +87,6 @@ ALONE: int
 COUPLED: int
 DISPLACED: int
 FAILED: int
-FRESH: int
 GUIDE_SLOPE: int
 INVERSE: int
 LAG: int
@@ -111,7 +110,6 @@ SHARE: int
 SHARES: int
 SIDES: int
 SLIDERS: int
-SPARE: int
 STRAIN_BEGIN: int
 STRAIN_CORRECTION: int
 TIME_STEP: int

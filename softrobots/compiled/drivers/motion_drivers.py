@@ -11,23 +11,11 @@ from softrobots.compiled.drivers.intrinsics import Array, fabs, where
 from softrobots.compiled.motion_settings import *
 
 
-def count_corrections(w: Array, width: int, count: float, renewed: float) -> None:
-    """Tell by the corrections of a step whether the next one computes its factors again: if `SPARE` is used up.
-
-    They are kept until the corrections that steps need beyond those of their own step add up to what they cost; not where
-    stiff springs ring or each stage has factors of its own, as corrections shrink too slowly there with those of another step.
-    """
-    w[SPARE * width] -= where(count > w[FRESH * width], count - w[FRESH * width], 0.0)
-    if renewed > 0.5:
-        w[FRESH * width] = count
-        w[SPARE * width] = where(w[COUPLED * width] > 0.5, 0.0, FACTORS_COST)
-
-
 def settle_middle(w: Array) -> bool:
     """Find the accelerations of a step; tell whether the corrections converge.
 
-    Where the factors are computed again is in `count_corrections`. They are those of a point that was coasted to, or of one
-    that the factors before have corrected: an extrapolated one would have its forces, which are wrong where stiff springs ring.
+    The first correction takes the factors of the step before: those of the extrapolated point would have its forces, which are
+    wrong where stiff springs ring. Those of a point that was coasted to are nearly right.
     """
     choose_order(w)
     for i in range(N):
@@ -36,34 +24,27 @@ def settle_middle(w: Array) -> bool:
         motion_coast(w)
         for i in range(N):
             apply_correction(w, i)
-    first = 1
     if w[N_HISTORY] < 0.5 or w[COASTS] > 0.5:
-        first = 0
-        w[SPARE] = 0.0
-    renewed = 0.0
-    factored = 0.0
-    slow = 0.0
+        motion_factor(w)
+    else:
+        motion_correct(w)
     w[LAST_CHANGE] = 1e300
     for step in range(MOTION_CORRECTIONS):
-        if slow > 0.5 or (step == first and w[SPARE] < 0.5):
-            w[SPARE] = 0.0
-            w[COUPLED] = where(slow * factored > 0.5, 1.0, COUPLED_FADES * w[COUPLED])
-            renewed = 1.0 - slow
-            factored = 1.0
-            motion_factor(w)
-        else:
-            motion_correct(w)
         w[CHANGE] = 0.0
         for i in range(N):
             apply_correction(w, i)
         judge_corrections(w)
         if w[SETTLED] > 0.5:
-            count_corrections(w, 1, step, renewed)
             return True
         if w[CHANGE] > 1e3 * w[LAST_CHANGE]:
             return False
-        slow = where(w[CHANGE] > RENEW_SHARE * w[LAST_CHANGE], 1.0, 0.0)
+        slow = w[CHANGE] > RENEW_SHARE * w[LAST_CHANGE]
         w[LAST_CHANGE] = w[CHANGE]
+        w[COUPLED] = where(slow, 1.0, w[COUPLED])
+        if slow or (step == 0 and w[COASTS] < 0.5):
+            motion_factor(w)
+        else:
+            motion_correct(w)
     return w[CHANGE] < MOTION_LEFT
 
 

@@ -11,7 +11,7 @@ from typing import Any
 from softrobots.compiled.drivers.generated_names import *
 from softrobots.compiled.drivers.intrinsics import Array, fabs, where, zeros
 from softrobots.compiled.drivers.lane_drivers import Places, Rows, load_block, load_case
-from softrobots.compiled.drivers.motion_drivers import count_corrections, motion_run
+from softrobots.compiled.drivers.motion_drivers import motion_run
 from softrobots.compiled.motion_settings import *
 
 
@@ -55,17 +55,12 @@ def settle_middle_lanes(w: Array, n_history: int) -> None:
     first = 1
     if coasting > 0.5 or n_history == 0:
         first = 0
-        w[SPARE * LANES] = 0.0
     fill_lanes(w, LAST_CHANGE, 1e300)
-    renewed = 0.0
-    factored = 0.0
     slow = 0.0
     for step in range(MOTION_CORRECTIONS):
-        if slow > 0.5 or (step == first and w[SPARE * LANES] < 0.5):
-            w[SPARE * LANES] = 0.0
-            fill_lanes(w, COUPLED, where(slow * factored > 0.5, 1.0, COUPLED_FADES * w[COUPLED * LANES]))
-            renewed = 1.0 - slow
-            factored = 1.0
+        if slow > 0.5:
+            fill_lanes(w, COUPLED, 1.0)
+        if step == first or slow > 0.5:
             motion_factor_lanes(w)
         else:
             motion_correct_lanes(w)
@@ -73,7 +68,6 @@ def settle_middle_lanes(w: Array, n_history: int) -> None:
         for i in range(N):
             apply_correction_lanes(w, i)
         if lanes_to_settle(w) < 0.5:
-            count_corrections(w, LANES, step, renewed)
             break
         slow = slow_lanes(w)
     for lane in range(LANES):

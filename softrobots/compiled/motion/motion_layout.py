@@ -118,11 +118,7 @@ class MotionLayout:
     settled: int = field(init=False)
     """1 where the corrections have converged, 0 where they have not."""
     coupled: int = field(init=False)
-    """Above 1/2 where each stage has a matrix of its own, which couples both, else both have that of the second."""
-    spare: int = field(init=False)
-    """Corrections that steps may need beyond those of the step whose factors they take, before there are new ones."""
-    fresh: int = field(init=False)
-    """Corrections of that step."""
+    """1 where each stage has a matrix of its own, which couples both, 0 where both have that of the second."""
     failed: int = field(init=False)
     """1 after a step that has not converged as a whole: later ones are extrapolated only; of lanes, that one is done alone."""
     stages: int = field(init=False)
@@ -177,9 +173,7 @@ class MotionLayout:
             history=KEPT_DIFFERENCES * k * n, sizes=KEPT_DIFFERENCES, weights=KEPT_DIFFERENCES, n_history=1, last_step=1
         )
         path = dict(motors_begin=m, motors_middle=m, motors_end=m, whole_step=1, share=1, parts=1, most_parts=1)
-        search = dict(
-            coasts=1, scale=n, change=1, last_change=1, change_before=1, settled=1, coupled=1, spare=1, fresh=1, failed=1
-        )
+        search = dict(coasts=1, scale=n, change=1, last_change=1, change_before=1, settled=1, coupled=1, failed=1)
         stages = dict(stages=(k - 1) * 2 * n, forces=k * (self.strains or 0) if k == 2 or full or self.rubbing else 0)
         count = (self.strains or 0) * self.rubbing
         rubbing = {name: count for name in _RUBBING} | dict(line=n * self.rubbing)

@@ -33,8 +33,6 @@ def make_motion_program(unknowns: Unknowns, *, full_damping: bool = False, order
     docstring, places = _manual(plan)
     values: dict[str, object] = {name: value for name, value in vars(motion_settings).items() if name.isupper()}
     values |= layout.constants()
-    if layout.strains is None or not plan.couples:  # cheap factors, or actuators, which may go slack
-        values["FACTORS_COST"] = 0.0
     if layout.coasting:
         values["STIFFNESS"] = tuple(plan.unknowns.chain.stiffness[list(plan.unknowns.strains)].tolist())
     values |= {"WORKSPACE_SIZE": parts.size, "LANE_SIZE": parts.size, "LANES": lane_count(parts.size)}
