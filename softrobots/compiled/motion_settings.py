@@ -7,13 +7,16 @@ from softrobots.dynamics import friction_steps, midpoint
 MOTION_TOLERANCE = midpoint.CHANGE
 """Change of an unknown in the middle of a step of time that ends the corrections, relative to 1 rad or m or its size."""
 
-MOTION_ROUNDING = 1e-10
+MOTION_NEXT = 0.1 * MOTION_TOLERANCE
+"""Expected change by the next correction, below which that is left out: it is what a step leaves, and steps add up."""
+
+MOTION_ROUNDING = midpoint.ROUNDED
 """Change that may be left where corrections no longer shrink."""
 
 MOTION_CORRECTIONS = midpoint.ITERATIONS
 """Largest number of corrections of a step of time; then it is halved."""
 
-MOTION_LEFT = midpoint.ROUNDED
+MOTION_LEFT = midpoint.LEFT
 """Change by the last of them, below which it is not halved."""
 
 RUBBING_CORRECTIONS = float(midpoint.RUBBING_ITERATIONS)

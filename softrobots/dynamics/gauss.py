@@ -26,7 +26,7 @@ import math
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.dynamics.midpoint import CHANGE, ITERATIONS, RENEWED, ROUNDED, SLOW, MidpointRule, Stage, State, Step
+from softrobots.dynamics.midpoint import CHANGE, ITERATIONS, LEFT, RENEWED, ROUNDED, SLOW, MidpointRule, Stage, State, Step
 
 _ROOT = math.sqrt(3.0)
 
@@ -77,7 +77,7 @@ class GaussRule(MidpointRule):
             if not moved < 1e3 * last:
                 return None
             shrinking, last = moved / last, moved
-        else:
+        if not moved <= LEFT:
             return None
         self._earlier[:] = [(h, coasting + h * h * (squares @ a)), *self._earlier[:2]]
         x, rates, accelerations = start.x.copy(), start.rates.copy(), np.zeros(equations.n)

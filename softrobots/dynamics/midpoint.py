@@ -31,8 +31,10 @@ from softrobots.model.dry_friction import FrictionMemory
 
 CHANGE = 1e-13
 """Change of the coordinates at the middle, relative to max(1, |y|), below which an iteration ends a step."""
-ROUNDED = 1e-9
+ROUNDED = 1e-11
 """The same, below which an iteration that no longer shrinks has reached rounding."""
+LEFT = 1e-9
+"""The same by the last iteration of a step, below which the step is taken."""
 ITERATIONS = 30
 """Most iterations of a step."""
 RUBBING_ITERATIONS = 100
@@ -199,7 +201,7 @@ class MidpointRule:
             if not moved < 1e3 * last:
                 return None
             shrinking, last = moved / last, moved
-        else:
+        if not moved <= LEFT:
             return None
         move_middle(a)
         ends, end_rates = np.zeros(n), np.zeros(n)

@@ -13,7 +13,7 @@ from __future__ import annotations
 from softrobots.compiled.motion.extrapolation import beyond_history, choose_order, compare_change, keep_history
 from softrobots.compiled.motion.gauss_step import gauss_blocks
 from softrobots.compiled.motion.motion_layout import MotionLayout
-from softrobots.compiled.motion_settings import MOTION_ROUNDING, MOTION_TOLERANCE
+from softrobots.compiled.motion_settings import MOTION_NEXT, MOTION_ROUNDING, MOTION_TOLERANCE
 from softrobots.compiled.trace.blocks import Block
 from softrobots.compiled.trace.expressions import Scalar, if_less, larger
 
@@ -74,10 +74,10 @@ def _judge(layout: MotionLayout, block: Block) -> Block:
     a guess may be near by chance.
     """
     change, last, before = (block.load(place) for place in (layout.change, layout.last_change, layout.change_before))
-    as_before = if_less(before, 1.0, if_less(change * last, MOTION_TOLERANCE * before, 1.0, 0.1), 0.1)
+    as_before = if_less(before, 1.0, if_less(change * last, MOTION_NEXT * before, 1.0, 0.1), 0.1)
     known = if_less(last, 0.1 * before, as_before, 0.1)
-    next_is_small = if_less(known * MOTION_TOLERANCE * last, change * change, 0.0, 1.0)
-    next_is_small = if_less(change, 1e3 * MOTION_TOLERANCE, next_is_small, 0.0)
+    next_is_small = if_less(known * MOTION_NEXT * last, change * change, 0.0, 1.0)
+    next_is_small = if_less(change, 1e3 * MOTION_NEXT, next_is_small, 0.0)
     shrinking = if_less(change, 0.01 * last, if_less(last, 1.0, next_is_small, 0.0), 0.0)
     rounded = if_less(0.5 * last, change, if_less(MOTION_ROUNDING, change, 0.0, 1.0), 0.0)
     block.store(layout.change_before, last)
