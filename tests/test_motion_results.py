@@ -46,6 +46,16 @@ def test_a_simulation_goes_on_from_a_saved_motion(released: sr.Motion, tmp_path:
     assert np.array_equal(one.q_springs, other.q_springs)
 
 
+def test_a_motion_keeps_the_damping_that_was_asked_for(arm: sr.SoftModel, tmp_path: Path) -> None:
+    """Damping by mass, too: in both engines, in what is saved, and in words."""
+    asked = {"damping_time": 0.01, "mass_damping": 2.5}
+    for simulate in (lambda *a, **k: sr.simulate(arm, *a, **k), sr.compile(arm, backend="python").simulate):
+        motion = simulate(0.02, (0.3, 0.6, -0.8), time_step=0.01, **asked)
+        again = sr.load_result(sr.save_result(motion, tmp_path / "a.npz", overwrite=True))
+        assert {name: getattr(motion, name) for name in asked} == asked == {name: getattr(again, name) for name in asked}
+        assert "0.01 s times stiffness, and 2.5 /s times mass" in str(again.summary())
+
+
 def test_motions_that_are_none_are_refused(released: sr.Motion, tmp_path: Path) -> None:
     file, n = sr.save_result(released, tmp_path / "a.npz"), len(released.time)
     for changes, words in (

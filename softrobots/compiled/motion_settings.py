@@ -25,7 +25,7 @@ RUBBING_CORRECTIONS = float(midpoint.RUBBING_ITERATIONS)
 OVERSHOT = friction_steps.OVERSHOT
 """Slope of the energy of a step uphill at the end of a correction over that downhill at its start, above which it is cut."""
 
-RENEW_SHARE = 0.2
+RENEW_SHARE = midpoint.SLOW
 """Share of the last change, above which the factors of a step are computed again: tendons go slack, or the body swings far."""
 
 LEAST_PART = 2.0**-12

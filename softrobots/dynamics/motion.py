@@ -94,6 +94,8 @@ class Motion(Summarised):
     `softrobots.dynamics.step_control`); None for fixed steps, where it is not measured."""
     tolerance: float | None = None
     """Largest `tip_error` that was asked for [m]; None for fixed steps."""
+    mass_damping: float = 0.0
+    """Damping over mass [1/s]."""
     interrupted: bool = False
     """Whether Ctrl-C ended it early; the rows end before the duration then, or their steps miss the tolerance."""
 

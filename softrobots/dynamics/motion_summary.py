@@ -29,6 +29,8 @@ def motion_parts(motion: Any) -> list[Part]:
     lengths = np.diff(motion.steps)
     steps = f"{len(lengths)}" + (f", of {lengths.min():.3g} to {lengths.max():.3g} s" if len(lengths) else "")
     damping = "of the file" if motion.damping_time is None else f"{motion.damping_time:g} s times stiffness"
+    if motion.mass_damping:
+        damping += f", and {motion.mass_damping:g} /s times mass"
     rows = [
         ("time", f"{motion.time[-1]:g} s{', INTERRUPTED' if motion.interrupted else ''}, {len(motion.time)} rows"),
         ("steps", steps),

@@ -27,7 +27,7 @@ from softrobots.statics.saved_results import pack_model, unpack_model
 from softrobots.statics.tables.columns import joint_columns
 
 _SAME = 1e-6  # relative difference of frequencies that rounding on another machine explains, of fast modes too
-_NUMBERS = ("damping_time", "tip_error", "tolerance")
+_NUMBERS = ("damping_time", "mass_damping", "tip_error", "tolerance")
 
 
 def _columns(model: SoftModel) -> dict[str, int]:
@@ -64,7 +64,7 @@ def _unpack(fields: Mapping[str, Any]) -> Motion:
         model=with_memories(fields, model, 1)[0],
         time=read_only(increasing("time", time, "s")),
         **columns,
-        **numbers,
+        **numbers | {"mass_damping": numbers["mass_damping"] or 0.0},
         gravity=load.gravity,
         energy=MotionEnergy(**energies),
         steps=read_only(increasing("steps", steps, "s")),

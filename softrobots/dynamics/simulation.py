@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from typing import Any
 
 import numpy as np
@@ -103,6 +103,7 @@ def simulate(
     path, load = MotorPath(model, q_motors, end), TimeLoad(model, force, wrench, end)
     weight = Load.of(model, gravity=gravity).gravity
     beta = None if damping_time is None else non_negative_number("damping_time", damping_time, "s")
+    damping = {"damping_time": beta, "mass_damping": non_negative_number("mass_damping", mass_damping, "1/s")}
     first = first_state(model, start, path, 0 if drive is None else drive.count)
     h, largest, rows = steps_and_rows(end, model.reach, time_step, output_step, tolerance)
     scheme = order_of_steps(order, h, model, path.constant and load.constant and drive is None)
@@ -122,15 +123,19 @@ def simulate(
         if drive is not None:
             grid = drive.with_samples(grid)
         if h is not None:
-            return _within(None, new_run, grid, beta, progress)
-        return _within(largest, new_run, first_grid(rows, [grid], scheme), beta, progress)
+            return _within(None, new_run, grid, damping, progress)
+        return _within(largest, new_run, first_grid(rows, [grid], scheme), damping, progress)
 
 
 def _within(
-    tolerance: float | None, new_run: Callable[[], Recorder], grid: FloatArray, damping_time: float | None, progress: bool | str
+    tolerance: float | None,
+    new_run: Callable[[], Recorder],
+    grid: FloatArray,
+    damping: Mapping[str, Any],
+    progress: bool | str,
 ) -> Motion:
     """Motion with the steps of a grid, and with shorter ones until the tip is within a tolerance [m]; None: any."""
-    facts: dict[str, Any] = {"damping_time": damping_time, "tolerance": tolerance, "tip_error": None}
+    facts: dict[str, Any] = {**damping, "tolerance": tolerance, "tip_error": None}
     run, history, last = new_run(), [math.inf], math.inf
     order = run.rule.order
     try:

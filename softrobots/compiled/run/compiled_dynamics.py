@@ -95,11 +95,8 @@ class CompiledDynamics(CompiledStatics):
         h, largest, rows = steps_and_rows(end, self._model.reach, time_step, output_step, tolerance)
         scheme = order_of_steps(order, h, self._model, path.constant and load.constant)
         run, given, damping = self._motion_code(gravity, damping_time, mass_damping, scheme)
-        facts: dict[str, Any] = {
-            "damping_time": None if damping_time is None else float(damping_time),
-            "tolerance": None if h is not None else largest,
-            "tip_error": None,
-        }
+        beta, asked = None if damping_time is None else float(damping_time), None if h is not None else largest
+        facts = {"damping_time": beta, "mass_damping": float(mass_damping), "tolerance": asked, "tip_error": None}
         first = course.first_state(self._model, start)
         (u, y), (du, dy) = ((one[: self._motors], one[self._motors :][self._moving]) for one in (first.x, first.rates))
         if first.memory is not None and (friction := self._model.structure.friction) is not None:
