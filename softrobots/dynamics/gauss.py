@@ -79,7 +79,7 @@ class GaussRule(MidpointRule):
             shrinking, last = moved / last, moved
         if not moved <= LEFT:
             return None
-        self._earlier[:] = [(h, coasting + h * h * (squares @ a)), *self._earlier[:2]]
+        self._past = [(h, coasting + h * h * (squares @ a)), *self._past[:2]]
         x, rates, accelerations = start.x.copy(), start.rates.copy(), np.zeros(equations.n)
         x[m:], rates[m:] = y0 + h * v0 + 0.5 * h * h * ((1.0 - shares) @ a), v0 + 0.5 * h * a.sum(axis=0)
         one, other = (stage.state for stage in stages)
@@ -95,14 +95,9 @@ class GaussRule(MidpointRule):
         accelerations[m:] = -np.linalg.solve(equations.mass_matrix(x)[m:, m:], residual)
         return np.asarray(equations.balance(x, rates, accelerations, wrenches)[:m])
 
-    def forget(self) -> None:
-        """Forget the last steps, from which the next is guessed."""
-        super().forget()
-        self._earlier: list[tuple[float, FloatArray]] = []
-
     def _guess(self, h: float, coasting: FloatArray) -> FloatArray:
         """Accelerations with which the stages continue those of the last equal steps, shape (2, n)."""
-        earlier = [y for length, y in self._earlier if abs(length - h) <= 1e-9 * h]
+        earlier = [y for length, y in self._past if abs(length - h) <= 1e-9 * h]
         extrapolation = ((), (1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))[len(earlier)]
         beyond = sum((one * (y - coasting) for one, y in zip(extrapolation, earlier, strict=True)), np.zeros_like(coasting))
         return np.asarray(np.array(FROM_SQUARES) @ beyond / (h * h))

@@ -136,7 +136,7 @@ class MidpointRule:
         self._block: Any = np.ix_(self.free, self.free) if torque else (self._at, self._at)
         self._damping = equations.damping[self._block]
         self._has_knees = torque is not None or equations.has_slack_tendons or equations.friction is not None
-        self.forget()
+        self._past: list[tuple[float, FloatArray]] = []
 
     def kicked(self, state: State, change: FloatArray) -> State:
         r"""State after the velocities of prescribed coordinates jump by `change`, shape (n_motors,).
@@ -150,9 +150,11 @@ class MidpointRule:
             rates[free] -= np.linalg.solve(mass[self._block], mass[np.ix_(free, fixed)] @ change[fixed])
         return state._replace(rates=rates)
 
-    def forget(self) -> None:
-        """Forget the last accelerations, which predict the next: the load jumps."""
-        self._past: list[tuple[float, FloatArray]] = []
+    def forget(self) -> bool:
+        """Forget the last steps, from which the next is guessed; tell whether there were any."""
+        known = bool(self._past)
+        self._past.clear()
+        return known
 
     def step(self, start: State, end_time: float) -> Step | None:
         """Return the step from a state to a time; None if its equations could not be solved."""

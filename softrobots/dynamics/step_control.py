@@ -70,8 +70,7 @@ def follow(recorder: Recorder, grid: FloatArray, *, to_knees: bool = False) -> I
                 raise NoStep(f"no step from t = {now:.6g} s succeeds, down to a length of {length:.3g} s{_range_end(recorder)}")
             elif knee is not None:
                 targets.append(knee)
-            else:
-                recorder.rule.forget()
+            elif not recorder.rule.forget():  # or a worse guess than none made it fail
                 targets.append(0.5 * (recorder.state.time + targets[-1]))
 
 

@@ -83,8 +83,9 @@ def motion_step(w: Array) -> int:
             w[N_HISTORY] += 1.0
             done += part
         else:
-            part *= 0.5
-            w[LAST_STEP] = 0.0
+            if w[N_HISTORY] < 0.5:  # else a worse guess than none may have made it fail
+                part *= 0.5
+            w[N_HISTORY] = 0.0
             w[FAILED] = 1.0
             if part < LEAST_PART:
                 w[TIME_STEP] = whole
