@@ -17,16 +17,31 @@ Differential Equations II, 1996, section IV.8): `A` has the eigenvalues :math:`\
 
 .. math:: (M + h \lambda D + h^2 \lambda^2 K)\, d = r_1 + (2 - \sqrt3)\, i\, r_2, \quad
           \Delta a_1 = -\operatorname{Re} d, \quad \Delta a_2 = -(2 + \sqrt3) \operatorname{Im} d
+
+That takes `M` and `K` of the second stage for both. Where corrections shrink slowly, as between knees, each has its own.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
 from softrobots.core.checks import FloatArray
-from softrobots.dynamics.midpoint import CHANGE, ITERATIONS, LEFT, RENEWED, ROUNDED, SLOW, MidpointRule, Stage, State, Step
+from softrobots.dynamics.midpoint import (
+    CHANGE,
+    ITERATIONS,
+    LEFT,
+    RENEWED,
+    ROUNDED,
+    SLOW,
+    MidpointRule,
+    Stage,
+    State,
+    Step,
+    Wrenches,
+)
 
 _ROOT = math.sqrt(3.0)
 
@@ -51,25 +66,20 @@ class GaussRule(MidpointRule):
 
     def step(self, start: State, end_time: float) -> Step | None:
         """Return the step from a state to a time; None if its equations could not be solved."""
-        from scipy.linalg import lu_factor, lu_solve
-
         equations, m = self.equations, self.equations.n_motors
         h, wrenches, shares = end_time - start.time, self.load(start.time), np.array(STAGES)
         y0, v0, weights, squares = start.x[m:], start.rates[m:], np.array(WEIGHTS), np.array(SQUARES)
         coasting, size = y0 + h * np.multiply.outer(shares, v0), max(1.0, math.sqrt(y0.dot(y0)))
-        a, last, factors, shrinking = self._guess(h, coasting), np.inf, None, 0.0
+        a, last, solve, shrinking = self._guess(h, coasting), np.inf, None, 0.0
         for iteration in range(1, ITERATIONS + 1):
             y, v = coasting + h * h * (squares @ a), v0 + h * (weights @ a)
             stages = tuple(self._stage(start, h * share, *place) for share, *place in zip(STAGES, y, v, a, strict=True))
             residual = np.array([stage.forces[m:] for stage in stages])
             if not math.isfinite(float(np.vdot(residual, residual))):
                 return None
-            if factors is None or iteration == RENEWED or (self._has_knees and shrinking > SLOW):
-                x, scale = stages[1].state.x, h * EIGENVALUE
-                slopes = scale * equations.damping + scale * scale * equations.stiffness(x, wrenches)
-                factors = lu_factor((equations.mass_matrix(x) + slopes)[m:, m:], check_finite=False)
-            both = lu_solve(factors, residual[0] + 1j * SECOND * residual[1], check_finite=False)
-            change = np.stack([both.real, both.imag / SECOND])
+            if solve is None or iteration == RENEWED or (self._has_knees and shrinking > SLOW):
+                solve = self._solver(h, stages if self._has_knees or iteration > 1 else stages[1:], wrenches)
+            change = solve(residual)
             a = a - change
             moved = h * h * float(np.linalg.norm(squares @ change)) / size
             if moved <= CHANGE or (moved >= 0.5 * last and last <= ROUNDED):
@@ -101,6 +111,29 @@ class GaussRule(MidpointRule):
         extrapolation = ((), (1.0,), (2.0, -1.0), (3.0, -3.0, 1.0))[len(earlier)]
         beyond = sum((one * (y - coasting) for one, y in zip(extrapolation, earlier, strict=True)), np.zeros_like(coasting))
         return np.asarray(np.array(FROM_SQUARES) @ beyond / (h * h))
+
+    def _solver(self, h: float, stages: Sequence[Stage], wrenches: Wrenches) -> Callable[[FloatArray], FloatArray]:
+        """Solver for the changes of the accelerations at both stages, shape (2, n), by both matrices, or that of the second."""
+        from scipy.linalg import lu_factor, lu_solve
+
+        equations, m = self.equations, self.equations.n_motors
+        masses = [equations.mass_matrix(stage.state.x)[m:, m:] for stage in stages]
+        stiff = [equations.stiffness(stage.state.x, wrenches)[m:, m:] for stage in stages]
+        damping = equations.damping[m:, m:]
+        if len(stages) == 1:
+            scale = h * EIGENVALUE
+            factors = lu_factor(masses[0] + scale * damping + scale * scale * stiff[0], check_finite=False)
+
+            def by_one(residual: FloatArray) -> FloatArray:
+                both = lu_solve(factors, residual[0] + 1j * SECOND * residual[1], check_finite=False)
+                return np.stack([both.real, both.imag / SECOND])
+
+            return by_one
+        blocks = [[h * WEIGHTS[i][j] * damping + h * h * SQUARES[i][j] * stiff[i] for j in range(2)] for i in range(2)]
+        for mass, row, place in zip(masses, blocks, range(2), strict=True):
+            row[place] = row[place] + mass
+        own = lu_factor(np.block(blocks), check_finite=False)
+        return lambda residual: np.asarray(lu_solve(own, residual.ravel(), check_finite=False)).reshape(2, -1)
 
     def _stage(self, start: State, after: float, y: FloatArray, v: FloatArray, a: FloatArray) -> Stage:
         """The robot at a stage, some time after the start of the step [s]."""
