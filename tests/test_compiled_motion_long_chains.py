@@ -61,6 +61,7 @@ LONG: dict[str, Callable[[], SoftModel]] = {
         sr.mount(sr.InflatableArm().urdf(), "tip", sr.PccArm(chain="lumped", muscle_azimuths=()))
     ),
     "sections": lambda: rod(elastic_sections=3),
+    "flexures": lambda: rod(chain="flexures", hinges=3, extension=False),
     "helix": ROBOTS["helix"],
     "tensions": ROBOTS["pcc_forces"],
     "lumped tensions": lambda: pcc(chain="lumped", hinges=3, muscles="forces"),

@@ -15,7 +15,7 @@ from hypothesis import strategies as st
 import softrobots as sr
 from softrobots.description.tag_reader import read_tags
 from softrobots.model.assembly import assemble
-from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, SerialChain
+from softrobots.model.serial_chain import ChainBody, ChainJoint, ChainSection, SerialChain, strains_of
 from softrobots.model.soft_model import SoftModel
 from softrobots.statics.kinematics import frame_placement
 from tests.support.foreign import BRANCHED, INERTIAL, SPRINGS, joint
@@ -32,7 +32,7 @@ def walk(chain: SerialChain, motors: np.ndarray, strains: np.ndarray) -> tuple[n
     for element in chain.elements:
         pose = pose @ placed(element.rotation, element.translation)
         if isinstance(element, ChainSection):
-            frames = section_frames(strains[element.strain : element.strain + 4], element.length)
+            frames = section_frames(np.pad(strains[list(strains_of(element))], (0, 4 - element.n_strains)), element.length)
             bodies += [(pose @ frame, body) for frame, body in zip(frames, element.bodies, strict=True)]
             pose = pose @ frames[-1]
         else:

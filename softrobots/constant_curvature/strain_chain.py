@@ -43,8 +43,16 @@ class SectionChain:
     """Joint positions of sections at given section coordinates, with derivatives."""
 
     def __init__(self, z: FloatArray, rest_length: FloatArray | float) -> None:
-        """Evaluate the map at section coordinates `z`, shape (..., 4) [rad, rad, rad, m], and rest lengths, shape (...) [m]."""
-        self._z, self._rest_length = z, np.asarray(rest_length)
+        """Evaluate the map at section coordinates `z` [rad, rad, rad, m], and rest lengths, shape (...) [m].
+
+        The coordinates have the shape (..., n): four, or the first three of sections that do not stretch.
+        """
+        self._n, self._z, self._rest_length = z.shape[-1], with_stretch(z), np.asarray(rest_length)
+
+    @property
+    def lengths(self) -> FloatArray:
+        """Lengths of the sections, shape (...) [m]."""
+        return np.asarray(self._rest_length + self._z[..., 3])
 
     @cached_property
     def _screw(self) -> Screw:
@@ -66,15 +74,15 @@ class SectionChain:
 
     @cached_property
     def first(self) -> FloatArray:
-        """First derivative of the joint positions, `J_b^-1 S`, shape (..., 6, 4)."""
-        return np.asarray(self._inverse @ self._twists)
+        """First derivative of the joint positions, `J_b^-1 S`, shape (..., 6, n)."""
+        return np.asarray(self._inverse @ self._twists[..., : self._n])
 
     def curvature(self, torque: FloatArray) -> FloatArray:
         r"""Return the weighted sum of the second derivatives of the joint positions, `sum_j torque_j d^2 m_j`.
 
         With columns `J_i` of the body Jacobian, :math:`\partial J_i / \partial m_j = [J_i, J_j]` for `i < j` and 0 otherwise,
         so `J_b m'' = S' - \sum_{i<j} m'_i m'_j [J_i, J_j]`; everything is contracted with `J_b^-T torque` first. The weights
-        of the joints have the shape (..., 6), the symmetric result (..., 4, 4).
+        of the joints have the shape (..., 6), the symmetric result (..., n, n).
         """
         covector = (torque[..., None, :] @ self._inverse)[..., 0, :]
         linear, angular = self._jacobian[..., :3, :], self._jacobian[..., 3:, :]
@@ -82,11 +90,11 @@ class SectionChain:
         brackets = np.swapaxes(half, -1, -2) - half
         brackets -= np.swapaxes(angular, -1, -2) @ (skew(covector[..., 3:]) @ angular)
         first = self.first
-        screw_part = self._screw.curvature(self._twists, covector)
+        screw_part = self._screw.curvature(self._twists, covector)[..., : self._n, : self._n]
         return np.asarray(screw_part - np.swapaxes(first, -1, -2) @ ((brackets * _UPPER) @ first))
 
     def velocity_product(self, rates: FloatArray) -> FloatArray:
-        r"""Return the joint accelerations, shape (..., 6), at constant rates of the section coordinates, shape (..., 4).
+        r"""Return the joint accelerations, shape (..., 6), at constant rates of the section coordinates, shape (..., n).
 
         :math:`J_b^{-1} (S'(\dot z) \dot z - \sum_{i<j} [J_i \dot m_i, J_j \dot m_j])`, see `curvature`.
         """
@@ -95,7 +103,7 @@ class SectionChain:
         ends = np.swapaxes(moving, -1, -2)
         linear = nearer[..., :3, :] @ ends[..., 3:] + nearer[..., 3:, :] @ ends[..., :3]
         brackets = np.concatenate([_axial(linear), _axial(nearer[..., 3:, :] @ ends[..., 3:])], axis=-1)
-        return np.asarray((self._inverse @ (self._screw.twist_product(rates) - brackets)[..., None])[..., 0])
+        return np.asarray((self._inverse @ (self._screw.twist_product(with_stretch(rates)) - brackets)[..., None])[..., 0])
 
     @cached_property
     def _twists(self) -> FloatArray:
@@ -108,6 +116,11 @@ class SectionChain:
     @cached_property
     def _inverse(self) -> FloatArray:
         return np.asarray(np.linalg.inv(self._jacobian))
+
+
+def with_stretch(z: FloatArray) -> FloatArray:
+    """Return section coordinates, or their rates, with zero for stretch where it is missing, shape (..., 3 or 4), (..., 4)."""
+    return z if z.shape[-1] == len(STRAINS) else np.concatenate([z, np.zeros((*z.shape[:-1], 1))], axis=-1)
 
 
 def joint_positions(z: FloatArray, rest_length: FloatArray | float) -> FloatArray:

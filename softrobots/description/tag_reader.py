@@ -50,7 +50,7 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
     for joint in root.findall("joint"):
         _read_joint(joint, source, springs, roles, rotors)
     sections = tuple(_section(element, source, roles) for element in _ours(root, "section"))
-    elastic = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in COORDINATES)]
+    elastic = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in tag.strains)]
     tags = RobotTags(
         springs=springs,
         roles=roles,
@@ -75,7 +75,9 @@ def read_tags(urdf_text: str, source: str = "the URDF") -> RobotTags:
         raise DescriptionError(
             f"{source} has both a joint and an actuator called {', '.join(shared)}; names that differ are required"
         )
-    return replace(tags, muscles=muscles)
+    tags = replace(tags, muscles=muscles)
+    _check_lengths_kept(tags, source)
+    return tags
 
 
 def _ours(element: ElementTree.Element, name: str) -> list[ElementTree.Element]:
@@ -139,13 +141,16 @@ def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]
         raise DescriptionError(
             f"{where} names the joints {' '.join(joints) or '(none)'}; six joints with the role 'section' are required"
         )
-    ei, gj, ea = (positive(element, key, where) for key in ("EI", "GJ", "EA"))
+    ei, gj = (positive(element, key, where) for key in ("EI", "GJ"))
+    ea = math.inf if element.get("EA") == "inf" else positive(element, "EA", where)
     facts = _facts_of_section(element, where)
     relaxed = _strains(element, "relaxed", where) if "relaxed" in element.attrib else facts["rest"]
     facts["bends"] = positive(element, "bends", where) if "bends" in element.attrib else facts["length"]
     facts["hinge"] = number(element, "hinge", where) if "hinge" in element.attrib else 0.0
     if facts["bends"] > facts["length"] or facts["hinge"] < 0.0:
         raise DescriptionError(f"{where} has bends {facts['bends']}, hinge {facts['hinge']}; required: <= length and >= 0")
+    if math.isinf(ea) and not facts["rest"][3] == relaxed[3] == 1.0:
+        raise DescriptionError(f"{where} has EA inf and the stretches {facts['rest'][3]}, {relaxed[3]}; required: 1")
     return SectionTag(joints=joints, bending_stiffness=ei, torsional_stiffness=gj, axial_stiffness=ea, relaxed=relaxed, **facts)
 
 
@@ -253,6 +258,17 @@ def _check_together(tags: RobotTags, source: str) -> None:
             available = ", ".join(map(str, sorted(segments))) or "none"
             raise DescriptionError(f"the {what} segment {segment}; available: {available}")
     _unique("friction of segment", [str(tag.segment) for tag in tags.friction], source)
+
+
+def _check_lengths_kept(tags: RobotTags, source: str) -> None:
+    """Refuse what needs the stretch of sections that keep their length."""
+    kept = [tag.name for tag in tags.sections if math.isinf(tag.axial_stiffness)]
+    linked = {name for link in tags.inflated_links for name in link.springs} - tags.springs.keys()
+    if kept and (len(kept) < len(tags.sections) or linked or tags.muscles):
+        raise DescriptionError(
+            f"{source} has section {kept[0]} with EA inf; required: EA inf of all sections, no actuators, and no inflated "
+            "links with springs of sections"
+        )
 
 
 def _base_to_tip(root: ElementTree.Element, tags: RobotTags) -> list[AnySectionTag]:

@@ -73,7 +73,7 @@ class AnySectionTag:
 
 @dataclass(frozen=True, kw_only=True)
 class SectionTag(AnySectionTag):
-    """A section of constant strain: six joints that follow four section coordinates."""
+    """A section of constant strain: six joints that follow its section coordinates."""
 
     joints: tuple[str, ...]
     """Its six joints, base to tip; `softrobots.constant_curvature.strain_chain.JOINTS` in that order."""
@@ -82,13 +82,18 @@ class SectionTag(AnySectionTag):
     torsional_stiffness: float
     """GJ [N m^2]."""
     axial_stiffness: float
-    """EA [N]."""
+    """EA [N]; infinite if it does not stretch."""
     relaxed: tuple[float, ...]
     """Strains where it carries nothing, as `rest`."""
     bends: float
     """Rest length of the part of it that bends, between straight rigid ones [m]."""
     hinge: float = 0.0
     """Length of rod from its start to that part [m]."""
+
+    @property
+    def strains(self) -> tuple[str, ...]:
+        """Its coordinates, of `COORDINATES`."""
+        return COORDINATES if math.isfinite(self.axial_stiffness) else COORDINATES[:3]
 
 
 @dataclass(frozen=True, kw_only=True)

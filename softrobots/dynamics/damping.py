@@ -94,5 +94,5 @@ def strain_damping(model: SoftModel, damping_time: float | None = None) -> Float
     strains = [joints[structure.spring_indices]]
     for row in structure.section_table if structure.constant_strain else ():
         of_section = joints[velocity_indices(model.pinocchio, row.joint_names)]
-        strains.append(of_section[np.array(_SHARING)].mean(axis=1))
+        strains.append(of_section[np.array(_SHARING[: len(row.places)])].mean(axis=1))
     return np.concatenate(strains)

@@ -189,7 +189,7 @@ class _Parts:
         if isinstance(tag, SectionTag):
             kind, entry["joints"] = "softrobots:section", list(tag.joints)
             values = {"EI": (tag.bending_stiffness, "N m2"), "GJ": (tag.torsional_stiffness, "N m2")}
-            values["EA"] = (tag.axial_stiffness, "N")
+            values |= {"EA": (tag.axial_stiffness, "N")} if math.isfinite(tag.axial_stiffness) else {}
             values |= {"bends": (tag.bends, "m"), "hinge": (tag.hinge, "m")} if tag.bends < tag.length else {}
         else:
             kind, entry["joints"] = "softrobots:lumped_section", dict(tag.joints)

@@ -49,6 +49,8 @@ class EquilibriumDerivatives:
         structure, held = model.structure, model.structure.muscle_lengths
         self.model, self.states, self.numbers, self.sections = model, states, numbers_of(model), section_joints(model)
         self.n_joint_motors, self.n_singles = len(structure.motor_joints), len(structure.spring_joints)
+        self.each = 0 if self.sections is None else len(structure.section_table[0].places)
+        """Number of coordinates of each section of constant strain (k)."""
         self.inputs = states.q_motors[:, self.n_joint_motors :]
         """Inputs of the actuators along the body, shape (N, n_muscles)."""
         self.is_held = held is not None
@@ -89,8 +91,7 @@ class EquilibriumDerivatives:
     @cached_property
     def chain(self) -> SectionChain:
         """The sections of constant strain."""
-        z = self.strains[:, self.n_singles :].reshape(len(self.strains), -1, 4)
-        return SectionChain(z, self.numbers["section_lengths"])
+        return SectionChain(self.by_section(self.strains[:, None])[:, 0], self.numbers["section_lengths"])
 
     @cached_property
     def compliance(self) -> FloatArray:
@@ -124,7 +125,8 @@ class EquilibriumDerivatives:
         if self.sections is None:
             return motors, strains
         by_section = (on_joints[..., self.sections][..., None, :] @ self.chain.first[:, None])[..., 0, :]
-        return motors, np.concatenate([strains, by_section.reshape(*strains.shape[:2], 4 * len(self.sections))], axis=-1)
+        by_section = by_section.reshape(*strains.shape[:2], self.each * len(self.sections))
+        return motors, np.concatenate([strains, by_section], axis=-1)
 
     def by_coordinates(self, by_twist: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Derivatives of rows that twists change by motor joints and strains, shapes (N, L, n_joint_motors), (N, L, n_strains).
@@ -137,7 +139,7 @@ class EquilibriumDerivatives:
         if self.sections is not None:
             bending = self.chain.curvature(self.tree.torque[:, self.sections])
             turned = (bending[:, None] @ self.by_section(rates)[..., None])[..., 0]
-            strains[..., self.n_singles :] += turned.reshape(*strains.shape[:2], 4 * len(self.sections))
+            strains[..., self.n_singles :] += turned.reshape(*strains.shape[:2], self.each * len(self.sections))
         return motors, strains
 
     def by_sections(self, by_twist: FloatArray, rates: FloatArray) -> dict[str, FloatArray]:
@@ -147,13 +149,13 @@ class EquilibriumDerivatives:
         """
         at_sections = self.tree.at_joints(by_twist)[..., self.sections]
         chord, torque = self.chain.first[:, None, :, 2], self.tree.torque[:, None, self.sections[:, 2]]
-        lengths = self.numbers["section_lengths"] + self.strains[:, None, self.n_singles + 3 :: 4]
-        turned = (chord[..., :3] * self.by_section(rates)[..., :3]).sum(-1) / lengths
-        return {"section_lengths": at_sections[..., 2] * chord[..., 3] + torque * turned, "section_joints": -at_sections}
+        turned = (chord[..., :3] * self.by_section(rates)[..., :3]).sum(-1)
+        longer = at_sections[..., 2] * self.chain.positions[:, None, :, 2] + torque * turned
+        return {"section_lengths": longer / self.chain.lengths[:, None], "section_joints": -at_sections}
 
     def by_section(self, strains: FloatArray) -> FloatArray:
-        """Strains of sections, shape (N, L, n_sections, 4), of all strains, shape (N, L, n_strains)."""
-        return strains[..., self.n_singles :].reshape(*strains.shape[:2], len(self.sections), 4)
+        """Strains of sections, shape (N, L, n_sections, k), of all strains, shape (N, L, n_strains)."""
+        return strains[..., self.n_singles :].reshape(*strains.shape[:2], len(self.sections), self.each)
 
 
 class AdjointRows:

@@ -81,8 +81,8 @@ def _of_sections(at: EquilibriumDerivatives, moved: Mapping[str, FloatArray]) ->
         joints[:, at.sections] -= moved["section_joints"]
     if "section_lengths" in moved:  # the chord is proportional to the length
         growth, chord, chords = moved["section_lengths"], at.chain.first[:, :, 2], at.sections[:, 2]
-        joints[:, chords] += chord[..., 3] * growth
-        lengths = at.numbers["section_lengths"] + at.strains[:, at.n_singles + 3 :: 4]
+        lengths = at.chain.lengths
+        joints[:, chords] += at.chain.positions[..., 2] / lengths * growth
         by_section = bent[:, at.n_singles :].reshape(*chord.shape)
         by_section[..., :3] = chord[..., :3] * (at.tree.torque[:, chords] * growth / lengths)[..., None]
     return joints, bent

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.constant_curvature.strain_chain import STRAINS, joint_positions
+from softrobots.constant_curvature.strain_chain import joint_positions
 from softrobots.core.checks import LARGEST, FloatArray, read_only
 from softrobots.core.errors import DescriptionError
 from softrobots.description.urdf_tags import ActuatorTag, LumpedSectionTag, RobotTags, SectionTag, SpringTag
@@ -77,7 +77,8 @@ def assemble(
         indices = velocity_indices(rigid, names).reshape(len(sections), -1)
         elastic_limits[indices] = _joint_limits(rigid, names).reshape(*indices.shape, 2)
         lengths, rest_joints = (np.array([getattr(row, name) for row in sections]) for name in ("bends", "rest_joints"))
-        coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv)
+        each = len(rows[0].places)
+        coordinates = SectionCoordinates(motor_indices, spring_indices, indices, lengths, rest_joints, rigid.nv, each)
     friction = None
     if any(tag.bending > 0.0 or (tag.guides > 0.0 and muscles) for tag in tags.friction):
         friction = DryFriction(tags.friction, rows, muscles, paths, strain_springs.rest)
@@ -267,7 +268,8 @@ def _section_rows(tags: Sequence[SectionTag], first: int) -> list[SectionRow]:
         return []
     rest = rest_coordinates(tags)
     joints = joint_positions(rest, np.array([tag.bends for tag in tags]))
-    by_name = [{name: first + 4 * row + k for k, name in enumerate(STRAINS)} for row in range(len(tags))]
+    strains = tags[0].strains
+    by_name = [{name: first + len(strains) * row + k for k, name in enumerate(strains)} for row in range(len(tags))]
     return [
         SectionRow(t.name, t.segment, t.length, t.radius, t.hinge, t.bends, t.joints, at, z, place, t.middle)
         for t, at, z, place in zip(tags, joints, rest, by_name, strict=True)
@@ -282,14 +284,15 @@ def _lumped_row(tag: LumpedSectionTag, spring_joints: tuple[str, ...]) -> Sectio
 
 
 def _strain_springs(rigid: Any, tags: Sequence[SpringTag], joints: tuple[str, ...], sections: Sequence[SectionTag]) -> Springs:
-    """Springs of the joints, then of the coordinates of the sections: `(EI, EI, GJ, EA) / length`."""
+    """Springs of the joints, then of the coordinates of the sections: `(EI, EI, GJ, EA) / length`; of EA, if it is finite."""
     stiffness, rest = (np.array([getattr(tag, name) for tag in tags], dtype=np.float64) for name in ("stiffness", "rest"))
     turning = [not _kind(rigid, name).startswith("JointModelP") for name in joints]
+    strains = sections[0].strains if sections else ()
     if sections:
         moduli = [(t.bending_stiffness, t.bending_stiffness, t.torsional_stiffness, t.axial_stiffness) for t in sections]
-        by_section = np.array(moduli) / np.array([[tag.length] for tag in sections])
+        by_section = np.array(moduli)[:, : len(strains)] / np.array([[tag.length] for tag in sections])
         stiffness = np.concatenate([stiffness, by_section.ravel()])
-        rest = np.concatenate([rest, rest_coordinates(sections, strains="relaxed").ravel()])
-        turning += [name != "stretch" for name in STRAINS] * len(sections)
-    names = (*joints, *(f"{tag.name}_{strain}" for tag in sections for strain in STRAINS))
+        rest = np.concatenate([rest, rest_coordinates(sections, strains="relaxed")[:, : len(strains)].ravel()])
+        turning += [name != "stretch" for name in strains] * len(sections)
+    names = (*joints, *(f"{tag.name}_{strain}" for tag in sections for strain in strains))
     return Springs(names, read_only(stiffness), read_only(rest), np.array(turning, dtype=bool))

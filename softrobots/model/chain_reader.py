@@ -173,8 +173,8 @@ def _elements(model: Any, path: list[int], structure: Structure) -> tuple[tuple[
             back = pin.rpy.rpyToMatrix(-float(row.rest_joints[0]), 0.0, 0.0)  # the origin of the first joint carries its rest
             axes = np.eye(3)
             bodies = tuple(_body(model.inertias[number], axes) for number in numbers)
-            strain = len(structure.spring_joints) + len(STRAINS) * sections[joint]
-            elements.append(ChainSection(row.name, _snapped(rotation @ back), translation, row.bends, strain, bodies))
+            strain, turn = row.places[STRAINS[0]], _snapped(rotation @ back)
+            elements.append(ChainSection(row.name, turn, translation, row.bends, strain, len(row.places), bodies))
         else:
             number, path = path[0], path[1:]
             slides, axes = _axes(model, number, neutral)

@@ -3,8 +3,8 @@ r"""Generalised coordinates of a robot: actuators and elastic coordinates, and t
 Statics works on elastic coordinates `y` (free) at given actuator coordinates `u`. Joint positions are a map `q(u, y)`:
 
 - a joint with a motor or a spring *is* a coordinate (`DirectCoordinates`);
-- the six joints of a section of constant strain follow its four section coordinates, `q = m(z) - m(z_rest)`
-  (`SectionCoordinates`), so that all joints are at zero at rest.
+- the six joints of a section of constant strain follow its four section coordinates, or three without stretch,
+  `q = m(z) - m(z_rest)` (`SectionCoordinates`), so that all joints are at zero at rest.
 
 `softrobots.model.muscles` adds muscles to either. With `M = dq/d(u, y)`, a load of torque `t(q)` and derivative `D =
 dt/dq` becomes `M^T t` in these coordinates, and its derivative :math:`M^T D M + \sum_j t_j\, d^2 q_j`.
@@ -146,7 +146,7 @@ def rest_coordinates(tags: Sequence[SectionTag | LumpedSectionTag], *, strains: 
 
 
 class SectionCoordinates:
-    """Motors and springs are coordinates by themselves; sections have four coordinates for six joints."""
+    """Motors and springs are coordinates by themselves; sections have four coordinates, or three, for six joints."""
 
     def __init__(
         self,
@@ -156,8 +156,9 @@ class SectionCoordinates:
         lengths: FloatArray,
         rest_joints: FloatArray,
         count: int,
+        each: int,
     ) -> None:
-        """Take the joints; elastic coordinates are springs, then four a section.
+        """Take the joints; elastic coordinates are springs, then those of the sections.
 
         Args:
             motor_indices: Places of the motor joints in Pinocchio's velocity vector.
@@ -166,16 +167,17 @@ class SectionCoordinates:
             lengths: Rest length of each section, shape (n,) [m].
             rest_joints: Joint positions that the joint origins of the description carry, shape (n, 6).
             count: Length of Pinocchio's velocity vector.
+            each: Number of coordinates of each section (k).
         """
         self.motor_indices, self.spring_indices, self.section_indices = motor_indices, spring_indices, section_indices
         self.lengths, self.rest_joints, self.count = lengths, rest_joints, count
         self.singles = np.concatenate([motor_indices, spring_indices])
         """Joints that are coordinates by themselves."""
-        order = np.concatenate([self.singles, np.repeat(section_indices[:, 0], 4)])
+        order = np.concatenate([self.singles, np.repeat(section_indices[:, 0], each)])
         self.before = read_only((order[:, None] < order).astype(np.float64))
         """1 where the coordinate of the row is nearer to the base than that of the column, else 0, shape (n, n)."""
-        self.places = len(self.singles) + np.arange(4 * len(lengths)).reshape(-1, 4)
-        """Places of the coordinates of each section, motors before all, shape (n_sections, 4)."""
+        self.places = len(self.singles) + np.arange(each * len(lengths)).reshape(-1, each)
+        """Places of the coordinates of each section, motors before all, shape (n_sections, k)."""
 
     def at(self, motors: FloatArray, elastic: FloatArray) -> SectionPoint:
         """Return the robot at given coordinates."""
@@ -189,7 +191,7 @@ class SectionPoint:
         """Evaluate the map of the sections, unless they are out of range."""
         self._c = coordinates
         n = len(coordinates.spring_indices)
-        self._chain = SectionChain(elastic[n:].reshape(-1, 4), coordinates.lengths)
+        self._chain = SectionChain(elastic[n:].reshape(coordinates.places.shape), coordinates.lengths)
         self._motors, self._springs = motors, elastic[:n]
 
     @property
@@ -224,12 +226,12 @@ class SectionPoint:
         rates: FloatArray = np.zeros(self._c.count)
         n = len(self._c.spring_indices)
         rates[self._c.motor_indices], rates[self._c.spring_indices] = motors, elastic[:n]
-        rates[self._c.section_indices] = (self._chain.first @ elastic[n:].reshape(-1, 4, 1))[..., 0]
+        rates[self._c.section_indices] = (self._chain.first @ elastic[n:].reshape(*self._c.places.shape, 1))[..., 0]
         return rates
 
     def velocity_product(self, motors: FloatArray, elastic: FloatArray) -> FloatArray:
         """Second derivative of the map of each section along its rates."""
-        strain_rates = elastic[len(self._c.spring_indices) :].reshape(-1, 4)
+        strain_rates = elastic[len(self._c.spring_indices) :].reshape(self._c.places.shape)
         accelerations: FloatArray = np.zeros(self._c.count)
         accelerations[self._c.section_indices] = self._chain.velocity_product(strain_rates)
         return accelerations
@@ -263,7 +265,7 @@ class SectionPoint:
     def _combine(self, matrix: FloatArray) -> FloatArray:
         """Columns per motor, spring and section coordinate of a matrix with columns per joint."""
         c = self._c
-        blocks = matrix[:, c.section_indices].transpose(1, 0, 2) @ self._chain.first  # (n, m, 4)
+        blocks = matrix[:, c.section_indices].transpose(1, 0, 2) @ self._chain.first  # (n, m, k)
         flat = blocks.transpose(1, 0, 2).reshape(len(matrix), c.places.size)
         return np.concatenate([matrix[:, c.singles], flat], axis=1)
 

@@ -64,7 +64,9 @@ class ChainSection:
     length: float
     """Rest length [m]."""
     strain: int
-    """Place of the first of its four section coordinates among the strains."""
+    """Place of the first of its section coordinates among the strains."""
+    n_strains: int
+    """Number of them: four, or three without stretch."""
     bodies: tuple[ChainBody, ...]
     """The masses fixed to the frames behind its six joints `strain_chain.JOINTS`, in the axes that result from those joints and
     the axes of the start; the last is the end of the section."""
@@ -90,7 +92,7 @@ _LUMPED = (ChainJoint, ChainHinge)
 class SerialChain:
     """The elements from base to tip, with springs and muscles.
 
-    Strains are the coordinates of spring joints, base to tip, and then of sections, four each, without muscles. Given muscle
+    Strains are the coordinates of spring joints, base to tip, and then of sections, without muscles. Given muscle
     lengths constrain sums of strains, and the elastic coordinates are combinations of the strains; otherwise they are the
     strains.
     """
@@ -216,5 +218,5 @@ def strains_of(element: Element | ChainHinge) -> tuple[int, ...]:
     if isinstance(element, ChainHinge):
         return tuple(strain for joint in element.joints for strain in strains_of(joint))
     if isinstance(element, ChainSection):
-        return tuple(element.strain + place for place in range(4))
+        return tuple(element.strain + place for place in range(element.n_strains))
     return () if element.strain is None else (element.strain,)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.constant_curvature.strain_chain import STRAINS, in_range
+from softrobots.constant_curvature.strain_chain import STRAINS, in_range, with_stretch
 from softrobots.core.checks import FloatArray
 from softrobots.description.urdf_tags import ActuatorTag, LineTag, RobotTags, SpringTag
 from softrobots.model.actuator_laws import ActuatorLaws
@@ -22,8 +22,8 @@ from softrobots.model.springs import Springs
 class Structure:
     """The parts of a robot, base to tip.
 
-    *Strains* are the coordinates of spring joints and then of sections of constant strain, four each, before muscles with given
-    lengths constrain them.
+    *Strains* are the coordinates of spring joints and then of sections of constant strain, four each, or three
+    without stretch, before muscles with given lengths constrain them.
     """
 
     tags: RobotTags
@@ -107,7 +107,7 @@ class Structure:
         """Return the section coordinates, lumped or not, shape (n_sections, 4) [rad, rad, rad, m]."""
         strains = self.strains(motors, elastic)
         if self.constant_strain:
-            return strains[len(self.spring_joints) :].reshape(-1, 4)
+            return with_stretch(strains[len(self.spring_joints) :].reshape(len(self.section_table), -1))
         coordinates = np.array([section.origin for section in self.section_table]).reshape(-1, 4)
         for row, section in enumerate(self.section_table):
             for name, place in section.places.items():

@@ -101,7 +101,7 @@ class ContinuumArm(XacroRobot):
         options=HINGE_RULES,
     )
     torsion: bool = parameter(True, "", "Whether a lumped segment can twist: a torsional spring a hinge")
-    extension: bool = parameter(True, "", "Whether a lumped segment can stretch: a sliding spring a hinge")
+    extension: bool = parameter(True, "", "Whether a lumped segment can stretch, by a sliding spring a hinge, and flexures can")
     rgba: Sequence[float] | Sequence[Sequence[float]] = parameter(
         (0.55, 0.60, 0.65, 1.0), "", "Colour of a segment: red, green, blue, opacity in 0 to 1", form="colour"
     )

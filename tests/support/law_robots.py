@@ -24,6 +24,7 @@ PUSHES = {
     "pulled": 2.0,
     "pcc_lumped": 2.0,
     "tendons": 0.3,
+    "flexures": 2.0,
     "helix": 4.0,
     "helix_lumped": 4.0,
     "mounted": 2.0,
@@ -42,6 +43,9 @@ def model(kind: str) -> sr.SoftModel:
         return sr.load_model(BRANCHED, springs=SPRINGS, tip="finger")
     if kind == "mounted":  # motors, springs, sections and muscles in one
         return sr.load_model(sr.mount(sr.InflatableArm(), "tip", sr.PccArm(segment_lengths=(0.4,), elastic_sections=2)))
+    if kind == "flexures":  # motors, springs, and sections that keep their length
+        rod = sr.PccArm(segment_lengths=(0.4,), muscle_azimuths=(), chain="flexures", hinges=2, extension=False)
+        return sr.load_model(sr.mount(sr.InflatableArm(), "tip", rod))
     robot = {
         "arm": lambda: sr.InflatableArm(),
         "limp": lambda: sr.InflatableArm(max_moment=12.0),  # beyond it a link is on the plateau of its moment

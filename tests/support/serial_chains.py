@@ -85,6 +85,7 @@ ROBOTS: dict[str, Callable[[], SoftModel]] = {
     "pcc": lambda: pcc(elastic_sections=2),
     "pcc_forces": lambda: pcc(elastic_sections=2, muscles="forces"),
     "pcc_lumped": lambda: pcc(chain="lumped", hinges=2),
+    "flexures": lambda: sr.load_model(sr.PccArm(chain="flexures", muscle_azimuths=(), hinges=2, extension=False)),
     "helix": lambda: sr.load_model(sr.HelixTube(elastic_sections=6)),
     "helix_lumped": lambda: sr.load_model(sr.HelixTube(chain="lumped", hinges=6)),
     "odd": odd,

@@ -101,14 +101,17 @@ class PlainStatics:
         self._motor_columns = [column[name] for name in sorted(model.structure.motor_joints, key=lambda name: numbers[name])]
         self._spring_columns = [column[name] for name in springs]
         self._section_columns = np.array([[column[name] for name in tag.joints] for tag in sections], dtype=int).reshape(-1, 6)
-        self._lengths = np.array([tag.length for tag in sections])
+        self._lengths = np.array([tag.bends for tag in sections])
+        self._kept = any(np.isinf(tag.axial_stiffness) for tag in sections)  # sections keep their length
+        moving = ("bend_x", "bend_y", "twist", "stretch")[: 4 - self._kept]
         rest = [[*(strain * tag.length for strain in tag.rest[:3]), (tag.rest[3] - 1.0) * tag.length] for tag in sections]
         self._rest_sections = np.array(rest).reshape(-1, 4)
         by_tag = [[tag.bending_stiffness] * 2 + [tag.torsional_stiffness, tag.axial_stiffness] for tag in sections]
-        by_section = np.array(by_tag).reshape(-1, 4) / self._lengths[:, None]
+        each = np.array([tag.length for tag in sections]).reshape(-1, 1)
+        by_section = np.array(by_tag).reshape(-1, 4)[:, : len(moving)] / each
         self._stiffness = np.concatenate([[table[name][0] for name in springs], by_section.ravel()])
-        self._rest = np.concatenate([[table[name][1] for name in springs], self._rest_sections.ravel()])
-        names = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in ("bend_x", "bend_y", "twist", "stretch"))]
+        self._rest = np.concatenate([[table[name][1] for name in springs], self._rest_sections[:, : len(moving)].ravel()])
+        names = [*springs, *(f"{tag.name}_{strain}" for tag in sections for strain in moving)]
         self._plateaus = [
             ([names.index(names_of) for names_of in self._names(group)], group.max_moment)
             for group in model.spring_groups
@@ -142,9 +145,8 @@ class PlainStatics:
         count = len(self._spring_columns)
         rows[:, :count] -= torques[:, self._spring_columns]
         if len(self._lengths):
-            z = strains[:, count:].reshape(len(strains), -1, 4)
-            at_joints = torques[:, self._section_columns]
-            rows[:, count:] -= np.einsum("nsj,nsjz->nsz", at_joints, section_slopes(z, self._lengths)).reshape(len(z), -1)
+            slopes = section_slopes(self._by_section(strains), self._lengths)[..., : 4 - self._kept]
+            rows[:, count:] -= np.einsum("nsj,nsjz->nsz", torques[:, self._section_columns], slopes).reshape(len(rows), -1)
         held = np.zeros(len(strains))
         residual = rows
         if len(self.model.muscles):
@@ -168,6 +170,10 @@ class PlainStatics:
         if not self._lengths_given:
             return springs
         return np.array([self.model.structure.strains(*row) for row in zip(motors, springs, strict=True)])
+
+    def _by_section(self, strains: FloatArray) -> FloatArray:
+        z = strains[:, len(self._spring_columns) :].reshape(len(strains), len(self._lengths), -1)
+        return np.pad(z, ((0, 0), (0, 0), (0, 4 - z.shape[2])))
 
     def _spring_loads(self, strains: FloatArray) -> FloatArray:
         loads = self._stiffness * (strains - self._rest)
@@ -265,7 +271,7 @@ class PlainStatics:
         joints[:, self._motor_columns] = motors[:, : len(self._motor_columns)]
         joints[:, self._spring_columns] = strains[:, :count]
         if len(self._lengths):
-            z = strains[:, count:].reshape(len(strains), -1, 4)
+            z = self._by_section(strains)
             at_rest = section_joints(self._rest_sections, self._lengths)
             joints[:, self._section_columns] = (section_joints(z, self._lengths) - at_rest).real
         return joints

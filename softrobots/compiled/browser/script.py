@@ -77,7 +77,7 @@ def _springs(chain: SerialChain) -> list[tuple[str, str]]:
         if isinstance(element, ChainSection):
             units = (*["rad"] * 3, "m")
             own = [(f"{element.name} {strain}", unit) for strain, unit in zip(STRAINS, units, strict=True)]
-            strains |= dict(zip(strains_of(element), own, strict=True))
+            strains |= dict(zip(strains_of(element), own, strict=False))
         elif element.strain is not None:
             strains[element.strain] = element.name, "m" if element.slides else "rad"
     found = []

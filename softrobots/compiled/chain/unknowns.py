@@ -54,7 +54,7 @@ class Unknowns:
     """Whether straight muscles along one segment each are taken as routes, too: motion does so with given lengths."""
 
     def __post_init__(self) -> None:
-        """Refuse unknown names, strains that muscle lengths constrain, and all four at once."""
+        """Refuse unknown names, strains that muscle lengths constrain, and all of a section at once."""
         for name in self.locked:
             if name not in STRAINS:
                 raise NameNotFound("section strain", name, STRAINS)
@@ -62,11 +62,11 @@ class Unknowns:
             raise ParameterError(
                 "locked_strains", self.locked, "empty for muscles of given length that wind or pass several segments"
             )
-        if set(self.locked) == set(STRAINS):
-            raise ParameterError("locked_strains", self.locked, "three strains at most: with all four a section is rigid")
         constrained = {strain for group in self.chain.constrained for strain in group}
         sections = [element for element in self.chain.elements if isinstance(element, ChainSection)]
-        named = [pair for element in sections for pair in zip(STRAINS, strains_of(element), strict=True)]
+        named = [pair for element in sections for pair in zip(STRAINS, strains_of(element), strict=False)]
+        if any(self._locked_strains.issuperset(strains_of(element)) for element in sections):
+            raise ParameterError("locked_strains", self.locked, "fewer strains: with all of them a section is rigid")
         clash = sorted({name for name, strain in named if name in self.locked and strain in constrained})
         if clash:
             raise ParameterError("locked_strains", self.locked, f"without {', '.join(clash)}, which muscle lengths constrain")
@@ -79,7 +79,7 @@ class Unknowns:
             )
             raise ParameterError("model", self.chain.name, requirement)
         if self.locked and not self._locked_strains:
-            raise ParameterError("locked_strains", self.locked, "empty for a robot without sections of constant strain")
+            raise ParameterError("locked_strains", self.locked, "empty for a robot without sections that have such strains")
 
     @cached_property
     def strains(self) -> tuple[int, ...]:
@@ -183,6 +183,7 @@ class Unknowns:
             coordinates = [
                 unknown(self.place[strain]) if strain in self.place else scalar(chain.rest[strain]) for strain in strains
             ]
+            coordinates += [0.0] * (len(STRAINS) - len(strains))
         return TracedElement(
             kind=kind,
             rotation=constants(element.rotation),
@@ -294,7 +295,6 @@ class Unknowns:
 
     @cached_property
     def _locked_strains(self) -> frozenset[int]:
-        rows = [STRAINS.index(name) for name in self.locked]
-        return frozenset(
-            element.strain + row for element in self.chain.elements if isinstance(element, ChainSection) for row in rows
-        )
+        sections = [strains_of(element) for element in self.chain.elements if isinstance(element, ChainSection)]
+        pairs = [pair for strains in sections for pair in zip(STRAINS, strains, strict=False)]
+        return frozenset(strain for name, strain in pairs if name in self.locked)

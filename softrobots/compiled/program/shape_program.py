@@ -42,7 +42,7 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
     strains, springs = program.size, program.size + len(chain.rest)
     loads = springs + len(chain.elastic)
     placements = loads + len(chain.rest)
-    records, kinds, coordinates, frames = [], [], [], []
+    records, kinds, coordinates, frames, each = [], [], [], [], 0
     shares = [(k + 1) / points for k in range(points)]
     axes = np.eye(3)  # of the chain's frame in Pinocchio's of the same joint
     for element in chain.elements:
@@ -58,6 +58,7 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
             behind = [element.length, *[0.0] * 8]
             kinds.append(_KINDS.index("section"))
             coordinates.append(strains + element.strain)
+            each = element.n_strains
             frames += [{"name": element.name, "kind": "section", "share": share} for share in shares]
         records += [*start.ravel().tolist(), *shift.tolist(), *behind]
     kinds.append(_KINDS.index("slide"))  # the tip, which does not move
@@ -87,21 +88,25 @@ def with_shape(program: Program, unknowns: Unknowns, points: int) -> Shape:
         "SHARES": tuple(shares),
     }
     lines = [f"{name} = {value if value != () else (0,)!r}" for name, value in values.items()]
-    blocks = [*(_place(kind).text() for kind in _KINDS), _slack_walls(unknowns, strains, loads).text()]
+    blocks = [*(_place(kind, each).text() for kind in _KINDS), _slack_walls(unknowns, strains, loads).text()]
     functions = map(text_of, functions_of(shape_drivers))
     text = "\n\n\n".join([program.text.rstrip(), "\n".join(lines), *blocks, *functions]) + "\n"
     return Shape(text, springs, loads, placements + 12, placements + 12 * (len(frames) + 1) + 1, frames)
 
 
-def _place(kind: str) -> Block:
-    """Trace the placement behind an element, or at a share of a section; `before`: the placement before the element."""
+def _place(kind: str, each: int) -> Block:
+    """Trace the placement behind an element, or at a share of a section.
+
+    `before` is the placement before the element; a section has `each` strains.
+    """
     block = Block(f"place_{kind}", "Write a placement.", ("at", "row", "before", "q", "k"))
     axes, origin = _matrix(block.loads(0, 9, "before")), vector(block.loads(9, 3, "before"))
     record = [block.table("PLACED_RECORD", place, "row") for place in range(21)]
     origin, axes = origin + axes @ vector(record[9:12]), axes @ _matrix(record[:9])
     if kind == "section":
         share = block.table("SHARES", 0, "k")
-        screw = Screw([one * share for one in block.loads(0, 4, "q")], record[12] * share)
+        z = vector([*block.loads(0, each, "q"), *[0.0] * (4 - each)])
+        screw = Screw([one * share for one in z], record[12] * share)
         origin, axes = origin + axes @ screw.position, axes @ screw.rotation
     else:
         position = block.load(0, "q")

@@ -249,7 +249,7 @@ def grown_springs(model: SoftModel, before: SoftModel, q_springs: FloatArray) ->
     """
     rows, old_rows = model.structure.section_table, before.structure.section_table
     if model.n_motors != before.n_motors or any(
-        len(table.rest) != 4 * len(table.structure.section_table) for table in (model, before)
+        len(table.rest) != sum(len(row.places) for row in table.structure.section_table) for table in (model, before)
     ):
         raise ParameterError("model", model, f"of the same coordinates along the path, or of sections alone; was {before!r}")
     ends, old_ends = (np.concatenate([[0.0], np.cumsum([row.length for row in table])]) for table in (rows, old_rows))
