@@ -189,7 +189,7 @@ def test_a_batch_has_the_motions_of_its_cases(kind: str, rng: np.random.Generato
 
 
 @pytest.mark.system
-@pytest.mark.parametrize("kind", ["rod", "sections"])
+@pytest.mark.parametrize("kind", ["rod", "sections", "flexures"])
 def test_the_c_file_takes_the_same_steps(kind: str, tmp_path: Path) -> None:
     """Through ctypes."""
     model, force, h = LONG[kind](), (0.2, -0.1, 0.05), 1e-3

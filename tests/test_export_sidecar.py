@@ -46,6 +46,7 @@ ROBOTS: dict[str, XacroRobot] = {
     "one hinge": sr.PccArm(chain="lumped", hinges=1),
     "flexures": sr.PccArm(chain="flexures", hinges=4, muscle_azimuths=(), rest_bend_x=0.2),
     "three flexures": sr.PccArm(chain="flexures", hinges=3, muscle_azimuths=(), segment_lengths=(0.4, 0.3), damping_time=0.01),
+    "flexures of one length": sr.PccArm(chain="flexures", hinges=2, muscle_azimuths=(), extension=False),
     "chambers": sr.PccArm(kind=("pressure", "mckibben"), elastic_sections=2, muscle_azimuths=(0.0, 2.0, 4.0)),
     "muscles from the base": sr.PccArm(
         segment_lengths=(0.5, 0.3, 0.2),

@@ -28,6 +28,7 @@ ROBOTS: dict[str, tuple[Any, float, float]] = {
     "PCC, tensions": (sr.PccArm(kind="tension"), 0.5, 0.1),
     "PCC, elastic": (sr.PccArm(kind="elastic"), 0.5, 0.1),
     "PCC, lumped": (sr.PccArm(chain="lumped"), 0.5, 0.3),
+    "flexures": (sr.PccArm(chain="flexures", hinges=3, extension=False, muscle_azimuths=()), 0.5, 0.3),
     "tendons": (sr.TendonArm(), 0.05, 0.3),
     "helix": (sr.HelixTube(), 0.1, 0.3),
     "two hinges": (sr.InflatableArm(link_model="two_hinges", torsion=True), 5.0, 1.0),
