@@ -50,6 +50,13 @@ CASES: Mapping[str, Callable[[], Case]] = {
     "helix": lambda: Case(
         sr.HelixTube(length=0.3, elastic_sections=3), (), 0.0, (0.5, 1.0, -1.0), ("contraction", "diameter", "length")
     ),
+    "flexures": lambda: Case(
+        sr.PccArm(segment_lengths=(0.3, 0.25), muscle_azimuths=(), chain="flexures", hinges=2, extension=False),
+        (),
+        0.0,
+        (0.5, 1.0, -1.0),
+        ("segment_lengths[1]", "offset[2]", "bending_stiffness", "torsional_stiffness"),
+    ),
     "side branches": lambda: Case(
         sr.load_model(BRANCHED, springs=SPRINGS, tip="finger"),
         (0.3, 0.6, -0.2),
