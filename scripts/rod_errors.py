@@ -4,7 +4,7 @@ The rods stand upright under their weight; a force on the tip pulls it aside and
 over ten seconds, of the tip from that of a reference rod of the tests (`tests/support/planar_rod.py`), with compiled steps by
 default; then follow the distance of the reference from itself with one polynomial less, and by how much the simulations of
 pairs and flexures are faster than the motion (seconds of motion by seconds of the processor; with steps of a given length the
-least of several runs). Pairs bend and twist, flexures and sections stretch, too. Takes about ten minutes.
+least of several runs). Pairs and flexures bend and twist, sections stretch, too. Takes about ten minutes.
 """
 
 from __future__ import annotations

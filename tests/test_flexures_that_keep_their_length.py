@@ -77,6 +77,13 @@ def test_they_are_the_limit_of_stiff_ones() -> None:
     assert tips[1] < 1e-6
 
 
+def test_a_column_buckles_at_eulers_load() -> None:
+    """`pi^2 EI / 4 l^2`, of a column that does not stretch: 2.3e-5 low at ten."""
+    fields = {"segment_lengths": (0.57,), "rest_bend_x": 0.0, "rest_twist": 0.0, "hinges": 10, "extension": False}
+    found = sr.critical_load(rod(**fields), (), direction=(0.0, 0.0, -1.0))
+    assert found == pytest.approx(np.pi**2 * ROD["bending_stiffness"] / (4.0 * 0.57**2), rel=3e-5)
+
+
 def test_a_cantilever_is_the_inextensible_elastica() -> None:
     """A tip that turns by 45 degrees: of order 3.5 in their number, also where stiff ones have a stretch of 1e-7."""
     bending, length, load = 0.02, 0.5, 2.0
