@@ -41,6 +41,8 @@ class Kind:
     """Numbers in which the elements differ."""
     record: int
     """Size of the record of an element."""
+    bent: int = 0
+    """Number of places of sections whose joints are found at once; 0 of other kinds."""
 
 
 def element_kinds(plan: Plan) -> list[Kind]:

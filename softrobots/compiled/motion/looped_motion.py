@@ -27,6 +27,7 @@ from softrobots.compiled.motion.articulated import (
     carried_outward,
     moved_wrench,
 )
+from softrobots.compiled.motion.bent_sections import BentSections
 from softrobots.compiled.motion.gauss_step import corrections, right_hand_side
 from softrobots.compiled.motion.group_record import GroupRecord
 from softrobots.compiled.motion.motion_groups import (
@@ -84,7 +85,7 @@ class GroupLayout:
     state: int = field(init=False)
     """The strains, their rates and accelerations, and torques of actuators, at both stages (4, n, stages)."""
     bounds: int = field(init=False)
-    """First and last bound of the loops (2)."""
+    """First and last bound of the loops, and how often several sections are bent at once (3)."""
     end: int = field(init=False)
     """The first place behind."""
 
@@ -93,7 +94,7 @@ class GroupLayout:
         n, s = self.unknowns, self.stages
         passes = dict(frame=18 * s, origin=3, inertia=21 * s, pull=12, wrench=6 * s, sums=6 * s, answer=6 * s)
         state = dict(coordinates=3 * self.free * s, state=4 * n * s if s > 1 else 0)
-        assign_places(self, self.first, **passes, base=18, cosine=n * s, sine=n * s, **state, bounds=2, end=0)
+        assign_places(self, self.first, **passes, base=18, cosine=n * s, sine=n * s, **state, bounds=3, end=0)
 
     @property
     def placed(self) -> int:
@@ -126,12 +127,14 @@ def _trace_kind(
     parts: Sequence[ElementParts],
 ) -> Kind:
     names = ("at", "row", "q")
-    out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", names, loop=places.loop)
+    bent = BentSections(number) if places.stages > 1 and plan.unknowns.traced(groups[0][0]).kind == "section" else None
+    given = names if bent is None else (*names, "bent")
+    out = Block(f"move_{number}", "Outward pass of a group: motion of its bodies.", given, loop=places.loop)
     resist = back = Block(f"resist_{number}", "Inward pass: torques out of balance.", names, out.trace, loop=places.loop)
     place = Block(f"place_{number}", "Outward pass with positions alone.", names, out.trace)
     stages, columns = places.stages, TableColumns(out, f"GROUP_{number}", len(groups))
     group = MovingGroup(plan, out, groups, columns, parts, places.state if stages > 1 else None)
-    both = Factors(len(group.own))
+    group.bent, both = bent, Factors(len(group.own))
     record = GroupRecord(stages, both.size if pairs else 0)
     moving, end = _trace_move(out, record, places, pairs, group)
     total, loads = moved_wrench(vector(back.spaced(places.wrench, 6, stages, back.each())), moving.reach), []
@@ -176,7 +179,8 @@ def _trace_kind(
             step.store_all(plan.correction + stage * n, one, "q")
         blocks += [factor, step]
     _trace_place(place, places, group, plan.strains[0])
-    return Kind(number, [group[0] for group in groups], blocks, columns, record.size)
+    kind = Kind(number, [group[0] for group in groups], blocks, columns, record.size)
+    return kind if bent is None else replace(kind, blocks=[*blocks, bent.take, bent.bend], bent=bent.size)
 
 
 def _loaded(block: Block, place: int, count: int, is_complex: bool) -> Vector:

@@ -16,6 +16,7 @@ from softrobots.compiled.chain.muscle_terms import pulls_on
 from softrobots.compiled.chain.recursion import range_margin
 from softrobots.compiled.chain.traced_elements import TracedElement
 from softrobots.compiled.chain.unknowns import Unknowns
+from softrobots.compiled.motion.bent_sections import BentSections
 from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.motion.moving_joints import CompositeBody, JointState, RigidBody, SectionState, joint_state, round_part
 from softrobots.compiled.trace.blocks import Block, TableColumns
@@ -55,6 +56,8 @@ class MovingGroup:
         """Velocities of the coordinates of each element."""
         self.changes: list[list[Scalar]] = []
         """Their accelerations."""
+        self.bent: BentSections | None = None
+        """What finds the joints of a section, where others are found beside them."""
         self.own: list[Scalar] = []
         """`h/2 D + h^2/4 K` of each unknown."""
         self.curvatures: dict[tuple[int, int], Scalar] = {}
@@ -138,7 +141,8 @@ class MovingGroup:
         """
         first = self.elements[0]
         if first.kind == "section":
-            section = SectionState(first.coordinates, self.rates[0], self.changes[0], first.length)
+            given = first.coordinates, self.rates[0], self.changes[0], first.length
+            section = SectionState(*given) if self.bent is None else self.bent.state(block, *given, list(first.moving))
             beyond = if_less(0.0, range_margin(first, section.screw), 0.0, OUT_OF_RANGE)
             self.torques[0] = self.torques[0] + beyond
             return section.joints, section.slopes[:, list(first.moving)]

@@ -10,6 +10,7 @@ from softrobots.compiled.chain.elements import Vector, constants, vector
 from softrobots.compiled.chain.unrolled_chain import place_base
 from softrobots.compiled.drivers import guide_motion_drivers
 from softrobots.compiled.drivers.guide_drivers import angle_at, mean_decay, turn_at
+from softrobots.compiled.motion.bent_sections import COLUMNS, TOGETHER
 from softrobots.compiled.motion.gauss_step import copy_block, place_block
 from softrobots.compiled.motion.looped_motion import SOLVERS, GroupLayout, group_kinds, load_frame, store_frame
 from softrobots.compiled.motion.motion_groups import motion_groups, reach_behind
@@ -61,14 +62,30 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         for name, pass_calls in calls.items():
             steps = STEPS if name == "couple" else [name]
             own = [one for step in steps for one in names if one.rpartition("_")[0] == step]
-            pass_calls += [(kind.number, f"{one}(w, AT[i], ROW[i], PLACE[i])") for one in own]
+            more = ", BENT[i]" if kind.bent and name == "move" else ""
+            pass_calls += [(kind.number, f"{one}(w, AT[i], ROW[i], PLACE[i]{more})") for one in own]
+    bent, together = dict.fromkeys(sequence, 0), list[tuple[int, ...]]()
+    taken = "".join(f", {name}[i]" for name in COLUMNS[2:])
+    joints = [(kind.number, f"take_{kind.number}(w, BENT_AT[i]{taken})") for kind in kinds if kind.bent]
+    joints += [(kind.number, f"bend_{kind.number}(w, BENT_AT[i])") for kind in kinds if kind.bent]
+    for kind in kinds:
+        for one in range(0, len(kind.rows) if kind.bent else 0, TOGETHER):
+            rows = kind.rows[one : one + TOGETHER]
+            bent |= {row: record + 2 * place for place, row in enumerate(rows)}
+            rows += rows[-1:] * (TOGETHER - len(rows))  # the last one also stands for those that are missing
+            together.append((kind.number, record, *(place for row in rows for place in sequence[row][2:])))
+            record += kind.bent
     bends = any(unknowns.traced(row).kind == "turn" and unknowns.traced(row).moving for row in sequence)
     tables: dict[str, object] = {"FIRST": places.bounds, "COUNT": places.bounds + 1, "N_ELEMENTS": len(sequence)}
     tables |= {f"GROUP_{kind.number}": tuple(kind.columns.numbers) for kind in kinds if kind.columns.width}
+    if together:
+        tables |= dict(zip(COLUMNS, zip(*together, strict=True), strict=True))
+        tables |= {"BENT": tuple(bent[group[0]] for group in motion_groups(unknowns))}
+        tables |= {"BENT_COUNT": places.bounds + 2, "BENT_N_ELEMENTS": len(together)}
     ordered = [sequence[group[0]] for group in motion_groups(unknowns)]
     tables |= dict(zip(("KIND", "AT", "ROW", "PLACE"), zip(*ordered, strict=True), strict=True))
     frame = [
-        _prepare(plan, places, len(ordered)),
+        _prepare(plan, places, len(ordered), len(together)),
         _start_move(places, pairs),
         *([_bend(places, places.state if in_stages else plan.strains[0])] if bends else []),
         _start_articulate(plan, places),
@@ -86,12 +103,13 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
         tables |= {"STRAIN_CORRECTION": plan.correction, "TORQUES": plan.torques[0], "STRAINS_AT": strains, "RATES_AT": rates}
     tables |= {"N_STRAINS": n, "N_BENDS": n * places.stages, "N_STAGES": places.stages, "RATES": _rates(plan, places)}
     tables |= {} if actuators is None else actuators.tables
-    control = (("" if actuators is None else actuators.after) + control_text(plan, bends)).strip()
+    control = (("" if actuators is None else actuators.after) + control_text(plan, bends, bool(together))).strip()
     drivers = (turn_at, angle_at, mean_decay, *functions_of(guide_motion_drivers)) if plan.guides else ()
     loops, lane_loops = (
         [
             *([] if actuators is None else actuators.loops(suffix)),
             *(loop_text(name, purpose, calls[name], back=name in _INWARD, suffix=suffix) for name, purpose in passes.items()),
+            *([loop_text("bend", "Joints of sections.", joints, back=False, suffix=suffix, prefix="BENT_")] * bool(together)),
             *map(text_of, drivers),
             control.replace("_SUFFIX", suffix).replace("w[COUPLED]", flag),
         ]
@@ -101,7 +119,7 @@ def looped_motion(plan: MotionPlan) -> MotionParts:
     return MotionParts([*blocks.values()], record, tables, loops, lane_loops)
 
 
-def _prepare(plan: MotionPlan, places: GroupLayout, count: int) -> Block:
+def _prepare(plan: MotionPlan, places: GroupLayout, count: int, together: int) -> Block:
     block = Block("motion_prepare", "Compute what depends on motors, force, gravity and time step only.")
     unknowns, layout, zero = plan.unknowns, plan.layout, constants(np.zeros(3))
     frame = MovingFrame(constants(np.eye(3)), zero, zero, -vector(block.loads(layout.gravity, 3)))
@@ -113,7 +131,7 @@ def _prepare(plan: MotionPlan, places: GroupLayout, count: int) -> Block:
         frame, _, _ = moved(turned, joint_state(element.kind == "slide", element.coordinates[0], rate, change))
     frame = frame.shifted(range(3), reach_behind(unknowns, unknowns.leading_motors - 1).tolist())
     store_frame(block, places.base, frame)
-    block.store_all(places.bounds, [0.0, float(count)])
+    block.store_all(places.bounds, [0.0, float(count), float(together)])
     return block
 
 

@@ -6,7 +6,7 @@ from softrobots.compiled.motion.motion_layout import MotionPlan
 from softrobots.compiled.program.motion_parts import coast_text
 
 _MOVE = """    start_move_SUFFIX(w)
-BEND    move_all_SUFFIX(w)
+BENDBENT    move_all_SUFFIX(w)
 """
 _BEND = """    for i in range(N_BENDS):
         bend_SUFFIX(w, i)
@@ -79,8 +79,8 @@ CLOSE    start_place_SUFFIX(w)
     finish_place_SUFFIX(w)'''
 
 
-def control_text(plan: MotionPlan, bends: bool) -> str:
-    """Return the functions that call the passes; `bends`: whether joints turn."""
+def control_text(plan: MotionPlan, bends: bool, bent: bool) -> str:
+    """Return the functions that call the passes; `bends`: whether joints turn, `bent`: whether sections bend."""
     in_stages, routes = plan.layout.in_stages, plan.routes
     held = routes is not None and routes.held
     move, resist, articulate, solve = _MOVE, _RESIST, _ARTICULATE, "    correct_all_SUFFIX(w)\n"
@@ -105,7 +105,7 @@ def control_text(plan: MotionPlan, bends: bool) -> str:
     text += "\n\n\n" + coast_text(plan, "    start_resist_SUFFIX(w)\n" + solve)
     text = text.replace("CLOSE", "    close_lengths_SUFFIX(w, 0)\n" if held else "")
     text = _STAGES.replace("EVALUATE", move + resist) + text if in_stages else text
-    text = text.replace("BEND", _BEND if bends else "")
+    text = text.replace("BENT", "    bend_all_SUFFIX(w)\n" if bent else "").replace("BEND", _BEND if bends else "")
     text += _END.replace("CLOSE", _CLOSE if held else "") if plan.layout.rubbing else ""
     return text + ("    slide(w, STRAIN_BEGIN, 1.0)\n" if plan.guides else "")
 

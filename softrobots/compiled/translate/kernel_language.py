@@ -138,12 +138,15 @@ def read_module(text: str) -> Module:
 def rounds_apart(node: ast.For) -> int:
     """Return the number of rounds of a loop of which no round reads what another one writes; 0 of other loops.
 
-    Those are the loops of `softrobots.compiled.trace.blocks` over both stages of a step and over twelve components.
+    Those are the loops of `softrobots.compiled.trace.blocks` over both stages of a step, of several sections, and over twelve
+    components.
     """
     match node:
-        case ast.For(target=ast.Name(id="stage" | "part" as name), iter=ast.Call(args=[ast.Constant(value=2 | 12)])):
+        case ast.For(
+            target=ast.Name(id="stage" | "eight" | "part" as name), iter=ast.Call(args=[ast.Constant(value=2 | 8 | 12)])
+        ):
             if all(isinstance(one, ast.Assign) for one in node.body):
-                return 2 if name == "stage" else 12
+                return {"stage": 2, "eight": 8, "part": 12}[name]
     return 0
 
 

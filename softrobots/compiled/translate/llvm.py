@@ -1,8 +1,9 @@
 """The kernel language as text for LLVM: machine code without numba's search for types, which takes most of its time.
 
-Loops over both stages of a step or twelve components (`softrobots.compiled.trace.blocks`) become straight-line code with pairs
-or rows of numbers, on which the vector instructions of a processor work at once. LLVM itself vectorises few of them: it does
-not know that the places that a function reads and writes are different ones, and two rounds are too few to look.
+Loops over both stages of a step, over those of four sections, or over twelve components (`softrobots.compiled.trace.blocks`)
+become straight-line code with pairs, eights or rows of numbers, on which the vector instructions of a processor work at once.
+LLVM itself vectorises few of them: it does not know that the places that a function reads and writes are different ones, and
+few rounds are too few to look.
 """
 
 from __future__ import annotations
@@ -106,7 +107,7 @@ class _FunctionWriter(ExpressionWriter):
                 self._round(inside, body, head, end)
                 self.begin(end)
             case ast.For(target=ast.Name(id=name), body=body) if count := rounds_apart(node):
-                self.values[name], self.apart = literal(0), (name, "pair" if count == 2 else "row")
+                self.values[name], self.apart = literal(0), (name, {2: "pair", 8: "eight", 12: "row"}[count])
                 self._block(body)
                 self.apart = "", ""
             case ast.For(target=ast.Name(id=name), iter=ast.Call(args=limits), body=body):

@@ -22,9 +22,10 @@ TYPES: Mapping[str, ir.Type] = {
     "array": ir.DoubleType().as_pointer(),
     "pair": ir.VectorType(ir.DoubleType(), 2),
     "pair of bools": ir.VectorType(ir.IntType(1), 2),
+    "eight": ir.VectorType(ir.DoubleType(), 8),
     "row": ir.VectorType(ir.DoubleType(), 12),
 }
-"""Types of LLVM by those of the kernel language, of pairs and of rows."""
+"""Types of LLVM by those of the kernel language, of pairs, eights and rows."""
 
 NAMES = {kind: str(of) for kind, of in TYPES.items()}
 """Their names."""
@@ -46,7 +47,7 @@ _COMPARISONS: dict[type[ast.cmpop], tuple[str, str]] = {  # of ints, of floats
 
 
 class Value(NamedTuple):
-    """A number, a bool, a pair of either, or a row of numbers."""
+    """A number, a bool, a pair of either, or eight or a row of numbers."""
 
     text: str
     """Its name or literal."""
@@ -87,7 +88,7 @@ class Symbols:
 
     def intrinsic(self, name: str, kind: str) -> str:
         """Return the symbol of a function of LLVM."""
-        symbol = f"@llvm.{name}.{'f64' if kind == 'float' else 'v2f64'}"
+        symbol = f"@llvm.{name}.{'' if kind == 'float' else f'v{TYPES[kind].count}'}f64"
         self.declared[symbol] = f"declare {NAMES[kind]} {symbol}({NAMES[kind]})"
         return symbol
 
@@ -222,7 +223,7 @@ class ExpressionWriter:
         return self.new(f"shufflevector {single}, {NAMES[kind]} undef, <{count} x i32> zeroinitializer", kind)
 
     def _alike(self, *values: Value) -> tuple[list[Value], str]:
-        kind = next((one.kind for one in values if one.kind in ("pair", "row")), "float")
+        kind = next((one.kind for one in values if one.kind in ("pair", "eight", "row")), "float")
         return [self.cast(kind, one) for one in values], kind
 
     def arithmetic(self, operation: ast.operator, one: Value, other: Value) -> Value:
