@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 
 import softrobots as sr
-from softrobots.identification.row_equilibria import balanced_rows
+from softrobots.identification.derivatives.rows_and_states import States
+from softrobots.identification.row_equilibria import balanced_course, balanced_rows
+from softrobots.model.friction_coordinates import memory_of
 from tests.support.law_robots import PUSHES, ROBOTS, model
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
@@ -29,7 +31,8 @@ def test_rows_are_the_equilibria_of_each(kind: str) -> None:
     loads = {robot.tip: np.hstack([forces, np.zeros((n, 3))]), "": np.tile(GRAVITY, (n, 1))}
     each = [sr.solve_equilibrium(robot, q, f, gravity=GRAVITY, tolerance=1e-12) for q, f in zip(motors, forces, strict=True)]
     starts = np.array([one.q_springs for one in each]) * (1.0 + 1e-3 * random.standard_normal((n, robot.n_springs)))
-    states, found = balanced_rows(robot, motors, loads, starts, 1e-12)
+    states = States.at(robot, motors, starts, loads)
+    found = balanced_rows(robot, states, 1e-12)
     if robot.structure.muscle_lengths is not None or robot.n_springs > 24:
         assert not found.any()
         return
@@ -50,18 +53,38 @@ def test_rows_are_the_equilibria_of_each(kind: str) -> None:
 def test_an_unstable_equilibrium_is_left() -> None:
     """A straight link pressed along its axis beyond its buckling load balances, but does not stay."""
     arm = model("arm")
-    loads = {arm.tip: np.array([[-1e4, 0.0, 0.0, 0.0, 0.0, 0.0]])}
-    _, found = balanced_rows(arm, np.zeros((1, arm.n_motors)), loads, np.zeros((1, arm.n_springs)), 1e-12)
-    assert not found[0]
-    loads = {arm.tip: np.array([[-1.0, 0.0, 0.0, 0.0, 0.0, 0.0]])}
-    _, found = balanced_rows(arm, np.zeros((1, arm.n_motors)), loads, np.zeros((1, arm.n_springs)), 1e-12)
-    assert found[0]
+    for force, stays in ((-1e4, False), (-1.0, True)):
+        loads = {arm.tip: np.array([[force, 0.0, 0.0, 0.0, 0.0, 0.0]])}
+        states = States.at(arm, np.zeros((1, arm.n_motors)), np.zeros((1, arm.n_springs)), loads)
+        assert balanced_rows(arm, states, 1e-12)[0] == stays
 
 
 @pytest.mark.parametrize("robot", [sr.InflatableArm(), sr.TendonArm(elastic_sections=1, bending_friction=1e-3)])
 def test_moments_and_friction_are_left_to_each_row(robot: object) -> None:
     arm = sr.load_model(robot)
     loads = {arm.tip: np.array([[0.0, 0.0, 0.0, 0.0, 1e-3, 0.0]])}
-    states, found = balanced_rows(arm, arm.relaxed_motors[None], loads, arm.rest[None], 1e-12)
-    assert not found[0]
+    states = States.at(arm, arm.relaxed_motors[None], arm.rest[None].copy(), loads)
+    assert not balanced_rows(arm, states, 1e-12)[0]
     np.testing.assert_array_equal(states.q_springs[0], arm.rest)
+
+
+@pytest.mark.parametrize("gravity", [None, GRAVITY])
+@pytest.mark.parametrize("friction", [3e-4, 3e-3, [1e-3, 1e-2]])
+def test_rows_that_follow_one_another_are_those_of_a_trajectory(friction: object, gravity: object) -> None:
+    """There and back and across, from rest: sections slip, turn round, and stick, and tendons go slack."""
+    arm = sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.07), offset=0.4, elastic_sections=1, bending_friction=friction))
+    random, ramp = np.random.default_rng(3), np.r_[0.1:1.0:6j, 0.9:0.0:6j]
+    pulls = np.concatenate([np.outer(ramp, pull) for pull in random.uniform(-2e-3, 6e-3, (5, 6))])
+    motors, loads = arm.relaxed_motors - pulls, {} if gravity is None else {"": np.tile(GRAVITY, (len(pulls), 1))}
+    states, now = States.at(arm, motors, np.tile(arm.rest, (len(motors), 1)), loads), None
+    sliders, known = balanced_course(arm, states, None, 1e-12, lambda *_: False)  # none is searched by itself
+    assert known == len(motors)
+    for row, q in enumerate(motors):
+        now = sr.solve_equilibrium(arm, q, gravity=gravity, previous=now, tolerance=1e-12)
+        # the rounding of the moments of friction over the softest direction, which sliders carry on from row to row
+        np.testing.assert_allclose(states.q_springs[row], now.q_springs, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(sliders[row], memory_of(now.model).bending, rtol=0, atol=1e-8)
+        np.testing.assert_allclose(states.actuator_loads[row], now.motor_torques, rtol=0, atol=1e-6)
+        scale = 1.0 / np.sqrt(arm.stiffness)
+        stiffness = (scale[:, None] * one * scale for one in (states.tangent[row], now.tangent_stiffness))
+        np.testing.assert_allclose(*stiffness, rtol=1e-5, atol=1e-5)  # of slip: over its length, down to a stick

@@ -11,7 +11,7 @@ or given lengths, where they are differences of the whole course.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Sequence
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -30,11 +30,10 @@ from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
-from softrobots.identification.row_equilibria import balanced_rows
-from softrobots.model.friction_coordinates import after_step, memory_of, untouched
+from softrobots.identification.row_equilibria import balanced_course, balanced_rows
+from softrobots.model.friction_coordinates import after_step, memory_of, remembering, untouched
 from softrobots.model.numbers import LAW
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastic_state import ElasticState
 from softrobots.statics.elastostatics import balanced_state
 
 _TOLERANCE = 1e-12  # of residuals, relative to the load: derivatives are taken there
@@ -179,6 +178,7 @@ class Predictor:
         self.actuator_slopes = parameters.offset_slopes
         """Derivatives of the actuators by the parameters, shape (n_motors, P)."""
         self._springs: FloatArray | None = near
+        self._sliders: FloatArray | None = None
         self.gaps, self.lost = gaps, list[int]()
         self._last: Prediction | None = None
         self._solved: dict[bytes, tuple[States, FloatArray | None]] = {}
@@ -209,7 +209,7 @@ class Predictor:
             found = self._solved.pop(key, None) or self._solve(model, values)
             if len(self._solved) >= max(_KEPT[0], min(_KEPT[1], _KEPT[2] // len(self.measurements))):
                 del self._solved[next(iter(self._solved))]
-            self._solved[key], self._springs = found, found[0].q_springs
+            self._solved[key], self._springs, self._sliders = found, found[0].q_springs, found[1]
             self._last = Prediction(self, np.array(values), model, *found)
         return self._last
 
@@ -222,39 +222,52 @@ class Predictor:
         measurements, (_, turn) = self.measurements, self.parameters.base(values)
         motors = measurements.motor_coordinates(model) + self.parameters.motor_offsets(values)
         loads = loads_on(model, measurements.loads, np.asarray(pin.exp3(turn)))
-        starts = np.tile(model.rest, (len(motors), 1)) if self._springs is None else self._springs
-        states, found = balanced_rows(model, motors, loads, starts, _TOLERANCE)
-        sliders, self.lost = list[FloatArray](), []
-        for row, state in self._equilibria(model, motors, loads, np.flatnonzero(~found), sliders):
-            if state is None:
-                self.lost.append(row)
-                continue
-            states.q_springs[row], states.tangent[row] = state.q_springs, state.tangent
-            states.actuator_loads[row], states.coupling[row] = state.load.motors, state.load.coupling
+        starts = np.tile(model.rest, (len(motors), 1)) if self._springs is None else self._springs.copy()
+        states, sliders = States.at(model, motors, starts, loads), None
+        if self.in_order:
+
+            def alone(sliders: FloatArray, rows: range) -> bool:
+                return not self._search(model, states, rows, sliders)
+
+            sliders, known = balanced_course(model, states, self._sliders, _TOLERANCE, alone)
+            self.lost = self._search(model, states, range(known, len(motors)), sliders)
+        else:
+            found = balanced_rows(model, states, _TOLERANCE)
+            self.lost = self._search(model, states, np.flatnonzero(~found).tolist(), None)
         if self.lost and not self.gaps:
             more = f" and {len(self.lost) - 10} more" if len(self.lost) > 10 else ""
             words = ", ".join(map(measurements.where, self.lost[:10])) + more + " have none"
             requirement = f"rows with an equilibrium at the values to start from; {words}: start from others, or leave them out"
             requirement += " by the mask; are order, signs and units of actuators and loads right?"
             raise ParameterError("measurements", measurements, requirement)
-        self._springs = states.q_springs
-        return states, np.array(sliders) if self.in_order else None
+        self._springs, self._sliders = states.q_springs, sliders
+        return states, sliders
 
-    def _equilibria(
-        self, model: SoftModel, motors: FloatArray, loads: dict[str, FloatArray], rows: Any, sliders: list[FloatArray]
-    ) -> Iterable[tuple[int, ElasticState | None]]:
-        """Search some rows from the equilibria of the values before, then from rest or the row before; appends sliders."""
-        now, before, cases = untouched(model), np.asarray(model.rest), load_cases(loads, len(motors)) if len(rows) else []
-        for row in rows.tolist():
+    def _search(self, model: SoftModel, states: States, rows: Sequence[int], sliders: FloatArray | None) -> list[int]:
+        """Search some rows from those of the values before, then from rest or the row before; return those without any.
+
+        With memory, the sliders before the first of them are given, and those before the others filled in.
+        """
+        now, before, lost = model, np.asarray(model.rest), []
+        if sliders is not None and len(rows):
+            now = remembering(model, memory_of(untouched(model))._replace(bending=sliders[rows[0]]))
+            before = states.q_springs[rows[0] - 1] if rows[0] else before
+        cases = load_cases({name: load[rows] for name, load in states.loads.items()}, len(rows))
+        for row, case in zip(rows, cases, strict=True):
             state, starts = None, [before] if self._springs is None else [self._springs[row], before]
-            if self.in_order:
-                sliders.append(memory_of(now).bending)
+            if sliders is not None:
+                sliders[row] = memory_of(now).bending
                 starts[:-1] = [before + one - self._springs[max(row - 1, 0)] for one in starts[:-1]]  # type: ignore[index]
             for start in starts:  # with memory as far from the row before as it was: what stuck still sticks
-                state = state or balanced_state(now, motors[row], cases[row], start, tolerance=_TOLERANCE)
-            if state is not None and self.in_order:
-                now, before = after_step(now, motors[row], state.q_springs), state.q_springs
-            yield row, state
+                state = state or balanced_state(now, states.q_motors[row], case, start, tolerance=_TOLERANCE)
+            if state is None:
+                lost.append(row)
+                continue
+            states.q_springs[row], states.tangent[row] = state.q_springs, state.tangent
+            states.actuator_loads[row], states.coupling[row] = state.load.motors, state.load.coupling
+            if sliders is not None:
+                now, before = after_step(now, states.q_motors[row], state.q_springs), state.q_springs
+        return lost
 
 
 def _position(prediction: Prediction, key: str, measured: FloatArray) -> Seen:

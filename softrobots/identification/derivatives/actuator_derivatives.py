@@ -8,6 +8,7 @@ constants changes the length, and the moment arms :math:`\partial l / \partial z
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cached_property
 
 import numpy as np
 
@@ -63,6 +64,23 @@ class ActuatorStates:
         across += self._radial[:, None] * (turned * paths.across[:, 1]).sum(-1)
         each = self._by_size[:, None] * (turned * paths.arms).sum(-1) + across / self._size[:, None]
         return self._summed(each)
+
+    @cached_property
+    def _pointing(self) -> FloatArray:
+        """Derivative of the length of each path by `A` and both parts of `B`, shape (N, n_paths, 3)."""
+        return np.stack([self._by_size, self._around / self._size, self._radial / self._size], axis=-1)
+
+    def stiffness(self) -> tuple[FloatArray, FloatArray]:
+        """Derivatives by strains of lengths, (N, n_muscles, n_strains), and of the load of laws, (N, n_strains, n_strains)."""
+        paths, pointing = self._paths, self._pointing
+        rows = np.concatenate([paths.arms[:, None], paths.across], axis=1) @ self._to_strains.reshape(len(paths.length), 4, -1)
+        arms = self._summed((pointing[..., None, :] @ rows)[..., 0, :].swapaxes(1, 2)).swapaxes(1, 2)
+        across = np.eye(3) - pointing[..., None] * pointing[..., None, :]
+        across[:, paths.separable] = np.diag([0.0, 1.0, 1.0])
+        bent = (across * (self._tensions[:, paths.muscle] / self._size)[..., None, None]) @ rows
+        count = rows.shape[-1]
+        turned = rows.reshape(-1, count).T @ bent.reshape(len(bent), -1, count)
+        return arms, turned + arms.swapaxes(1, 2) @ (self.by_length[..., None] * arms)
 
     def _differentiate_laws(self, inputs: FloatArray) -> None:
         kinds = np.array([tag.kind for tag in self._tags])
@@ -159,8 +177,7 @@ class ActuatorStates:
         rows = np.concatenate([paths.arms[:, None], paths.across], axis=1)
         moved = np.concatenate([of("path_arms", paths.arms)[:, :, None], of("path_across", paths.across)], axis=2)
         length, turned = of("path_length", paths.length), of("path_turned", paths.turned)
-        pointing = np.stack([self._along, self._around, self._radial], axis=-1) / size
-        pointing[..., 0] = self._by_size
+        pointing = self._pointing
         tangent = (moved @ z[..., None])[..., 0]
         tangent[..., 0] += length
         tangent[..., 1] += turned

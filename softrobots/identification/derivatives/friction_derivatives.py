@@ -85,8 +85,10 @@ class SliderStates:
         reach = np.maximum(size, BENDING_STICK)
         along = apart / reach * (size > BENDING_STICK)
         across = np.eye(2) - along[..., :, None] * along[..., None, :]
-        self._torque = apart / reach  # over the limit
-        self._stiffness = across * (friction.limit[:, None] / reach)[..., None]
+        self.torque = apart / reach
+        """Moment of friction over its limit, shape (N, n_sections, 2)."""
+        self.stiffness = across * (friction.limit[:, None] / reach)[..., None]
+        """Derivative of the moment by the bending, shape (N, n_sections, 2, 2) [N m/rad]."""
         self._stays = across * (BENDING_STICK / reach)[..., None]
 
     def loads(self, direct: FloatArray, compliance: FloatArray, limits: FloatArray, start: FloatArray) -> FloatArray:
@@ -98,10 +100,10 @@ class SliderStates:
             limits: Change of the limits, shape (n_sections, P) [N m].
             start: Change of the sliders before the first equilibrium, shape (n_sections, 2, P).
         """
-        loads: FloatArray = -self._torque[..., None] * limits[:, None]
+        loads: FloatArray = -self.torque[..., None] * limits[:, None]
         sliders = start
         for row, load in enumerate(loads):
-            load += self._stiffness[row] @ sliders
+            load += self.stiffness[row] @ sliders
             bending = direct[row] + (compliance[row] @ load.reshape(len(compliance[row]), -1)).reshape(load.shape)
             sliders = bending - self._stays[row] @ (bending - sliders)
         return loads

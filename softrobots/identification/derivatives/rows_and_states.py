@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from softrobots.core.checks import FloatArray
+from softrobots.model.soft_model import SoftModel
 from softrobots.statics.equilibrium import Equilibrium
 
 
@@ -28,6 +29,13 @@ class States(NamedTuple):
     """Derivative of the load on the elastic coordinates by the actuators, shape (N, n_springs, n_motors)."""
     strains: FloatArray | None = None
     """Strains, shape (N, n_strains), where they are known; tangent and coupling are not used where rows are."""
+
+    @classmethod
+    def at(cls, model: SoftModel, motors: FloatArray, springs: FloatArray, loads: Mapping[str, FloatArray]) -> States:
+        """States of a robot of which no more than the coordinates and the loads are known; the rest is zero."""
+        (n, count), n_motors = springs.shape, model.n_motors
+        rest = (np.zeros((n, *shape)) for shape in ((n_motors,), (count, count), (count, n_motors)))
+        return cls(motors, springs, loads, *rest)
 
     @classmethod
     def of(cls, equilibria: Sequence[Equilibrium]) -> States:
