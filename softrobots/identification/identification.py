@@ -11,6 +11,7 @@ import numpy as np
 from softrobots.core.checks import FloatArray, read_only
 from softrobots.core.errors import ParameterError
 from softrobots.core.summary import Part, Summarised, Table
+from softrobots.identification.derivatives.rows_and_states import States
 from softrobots.identification.fit import Fit
 from softrobots.identification.gauges import find_gauges
 from softrobots.identification.measurements import Measurements
@@ -34,6 +35,8 @@ class Comparison(NamedTuple):
     residuals: Mapping[str, FloatArray]
     """Measured minus predicted by quantity, shape (n, k), of poses position and rotation vector (n, 6); NaN where missing or
     not counted."""
+    states: States | None = None
+    """The equilibria of the rows; None of a file, and where others than these rows were rolled out."""
 
     @property
     def n_counted(self) -> int:
@@ -229,8 +232,8 @@ def identification_of(fit: Fit, aside: Any) -> Identification:
     elif aside is not None:
         rows_aside = {key: np.repeat(aside[:, None], one.shape[1], axis=1) for key, one in prediction.differences().items()}
         whole = _comparison(predictor.measurements, prediction, rows_aside)
-        parts = ({key: one[aside] for key, one in part.items()} for part in (whole.predicted, whole.residuals))
-        validation = Comparison(whole.measurements[aside], *parts)
+        parts = [{key: one[aside] for key, one in part.items()} for part in (whole.predicted, whole.residuals)]
+        validation = Comparison(whole.measurements[aside], parts[0], parts[1])
     return Identification(
         model=prediction.model,
         parameters=parameters.parameters,
@@ -252,7 +255,8 @@ def identification_of(fit: Fit, aside: Any) -> Identification:
 def _comparison(measurements: Measurements, prediction: Any, counted: Mapping[str, Any]) -> Comparison:
     """Measurements beside a prediction; residuals of what does not count are NaN."""
     residuals = {key: np.where(counted[key], values, np.nan) for key, values in prediction.differences().items()}
-    return Comparison(measurements, {key: seen.values for key, seen in prediction.seen.items()}, residuals)
+    predicted = {key: seen.values for key, seen in prediction.seen.items()}
+    return Comparison(measurements, predicted, residuals, prediction.at.states)
 
 
 def _interval(ends: tuple[float, float] | None) -> str:

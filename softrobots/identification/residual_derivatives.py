@@ -128,14 +128,14 @@ class EquilibriumDerivatives:
         by_section = by_section.reshape(*strains.shape[:2], self.each * len(self.sections))
         return motors, np.concatenate([strains, by_section], axis=-1)
 
-    def by_coordinates(self, by_twist: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Derivatives of rows that twists change by motor joints and strains, shapes (N, L, n_joint_motors), (N, L, n_strains).
+    def by_coordinates(self, by_joint: FloatArray, rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Derivatives of rows that joints change by motor joints and strains, shapes (N, L, n_joint_motors), (N, L, n_strains).
 
         Args:
-            by_twist: Derivatives by the twist of what is from each joint on, shape (N, n_joints, L, 6).
+            by_joint: Derivatives by the joint positions, shape (N, L, n_joints).
             rates: The rates of the strains in which loads work, shape (N, L, n_strains): the map turns with the strains.
         """
-        motors, strains = self.on_strains(self.tree.at_joints(by_twist))
+        motors, strains = self.on_strains(by_joint)
         if self.sections is not None:
             bending = self.chain.curvature(self.tree.torque[:, self.sections])
             turned = (bending[:, None] @ self.by_section(rates)[..., None])[..., 0]
@@ -238,7 +238,7 @@ class AdjointRows:
     def by_coordinates(self) -> tuple[FloatArray, FloatArray]:
         """Derivatives of pose and work by motor joints and strains, at fixed rates."""
         at = self._at
-        motors, by_strains = at.by_coordinates(self._motion[1], self.virtual)
+        motors, by_strains = at.by_coordinates(at.tree.at_joints(self._motion[1]), self.virtual)
         if self._works:
             by_strains = by_strains - at.springs.tangent(self.virtual)
         if self._works and at.actuators is not None:

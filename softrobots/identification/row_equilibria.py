@@ -187,7 +187,7 @@ def _evaluated(model: SoftModel, whole: States, rows: Any, tolerance: float) -> 
     actuator_loads = np.zeros((n, model.n_motors))
     if at.states.loads:
         joints = at.joint_rates(np.zeros((n, count, n_joints)), rates)
-        coupling[..., :n_joints], strains = at.by_coordinates(at.tree.work_slopes(*at.tree.twists(joints)), rates)
+        coupling[..., :n_joints], strains = at.by_coordinates(joints @ at.tree.stiffness(), rates)
         residual -= (joints @ at.tree.torque[..., None])[..., 0]
         tangent -= strains
         actuator_loads[:, :n_joints] = at.tree.torque[:, model.structure.motor_indices]

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from softrobots.core.checks import FloatArray, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
+from softrobots.identification.derivatives.rows_and_states import States
 from softrobots.identification.identification import Comparison, Identification
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
@@ -58,7 +59,8 @@ class IdentificationPage(Viewer):
         super().__init__(result.model, port=port)
         try:
             parameters = ParameterSet.of(self._model, result.names, shown.measurements.markers)
-            scenes = self._rows(Predictor(parameters, shown.measurements), result.solution, rows)
+            states = shown.states or Predictor(parameters, shown.measurements).at(result.solution).at.states
+            scenes = self._rows(states, rows)
             self._robot.show(next(iter(scenes.values())))
             animation = self._robot.animate(scenes)
             base = pin.SE3(pin.exp3(parameters.base(result.solution)[1]), parameters.base(result.solution)[0])
@@ -75,9 +77,9 @@ class IdentificationPage(Viewer):
             self.close()
             raise
 
-    def _rows(self, predictor: Predictor, values: FloatArray, rows: NDArray[np.int_]) -> dict[int, Scene]:
+    def _rows(self, states: States, rows: NDArray[np.int_]) -> dict[int, Scene]:
         """The predicted robot in the rows, by number of frame: at the begin and the end of a second each."""
-        states, model = predictor.at(values).at.states, self._model
+        model = self._model
         scenes: dict[int, Scene] = {}
         for place, row in enumerate(rows.tolist()):
             wrenches = {name: wrench[row] for name, wrench in states.loads.items() if name}

@@ -72,15 +72,18 @@ class ActuatorStates:
 
     def stiffness(self) -> tuple[FloatArray, FloatArray]:
         """Derivatives by strains of lengths, (N, n_muscles, n_strains), and of the load of laws, (N, n_strains, n_strains)."""
-        paths, pointing = self._paths, self._pointing
-        rows = np.concatenate([paths.arms[:, None], paths.across], axis=1) @ self._to_strains.reshape(len(paths.length), 4, -1)
-        arms = self._summed((pointing[..., None, :] @ rows)[..., 0, :].swapaxes(1, 2)).swapaxes(1, 2)
+        paths, pointing, count = self._paths, self._pointing, self._to_strains.shape[1]
+        rows = np.concatenate([paths.arms[:, None], paths.across], axis=1)
         across = np.eye(3) - pointing[..., None] * pointing[..., None, :]
         across[:, paths.separable] = np.diag([0.0, 1.0, 1.0])
-        bent = (across * (self._tensions[:, paths.muscle] / self._size)[..., None, None]) @ rows
-        count = rows.shape[-1]
-        turned = rows.reshape(-1, count).T @ bent.reshape(len(bent), -1, count)
-        return arms, turned + arms.swapaxes(1, 2) @ (self.by_length[..., None] * arms)
+        turned = rows.swapaxes(1, 2) @ across @ rows * (self._tensions[:, paths.muscle] / self._size)[..., None, None]
+        each, n = (pointing[..., None, :] @ rows)[..., 0, :], len(pointing)
+        arms, loads = np.zeros((n, len(self._tags), count + 1)), np.zeros((n, count + 1, count + 1))
+        for path, places in enumerate(paths.places):  # of what is no strain at the end
+            arms[:, paths.muscle[path], places] += each[:, path]
+            loads[:, places[:, None], places] += turned[:, path]
+        arms = arms[..., :count]
+        return arms, loads[:, :count, :count] + arms.swapaxes(1, 2) @ (self.by_length[..., None] * arms)
 
     def _differentiate_laws(self, inputs: FloatArray) -> None:
         kinds = np.array([tag.kind for tag in self._tags])

@@ -138,6 +138,17 @@ class LoadedTree:
         """Torque of the loads on each joint, shape (N, n) [N m or N]."""
         return np.asarray((self.axes * self._beyond).sum(-1))
 
+    def stiffness(self) -> FloatArray:
+        """Derivatives of the torques of forces and gravity by joint positions, shape (N, n, n); what has moments has others.
+
+        Beyond two joints everything moves with both: the later one turns and shifts what the turn of the first one carries.
+        """
+        later, n = self.topology.beyond, self.axes.shape[1]
+        turned = (later @ self._turned.reshape(len(self.axes), n, 9)).reshape(-1, n, 3, 3)
+        felt = cross(self.axes[..., :3], self._beyond[..., :3]) + (turned @ self.axes[..., 3:, None])[..., 0]
+        found = later * (self.axes[..., 3:] @ felt.swapaxes(1, 2))
+        return np.asarray(found + (found * (1.0 - np.eye(n))).swapaxes(1, 2))
+
     def frame(self, name: str) -> tuple[int, FloatArray, FloatArray]:
         """Joint that carries a frame (-1: the base), the frame's position in it, shape (3,), and in the world, (N, 3) [m]."""
         number = self._model.frame_id(name)
