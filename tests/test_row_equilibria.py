@@ -33,7 +33,7 @@ def test_rows_are_the_equilibria_of_each(kind: str) -> None:
     starts = np.array([one.q_springs for one in each]) * (1.0 + 1e-3 * random.standard_normal((n, robot.n_springs)))
     states = States.at(robot, motors, starts, loads)
     found = balanced_rows(robot, states, 1e-12)
-    if robot.structure.muscle_lengths is not None or robot.n_springs > 24:
+    if robot.structure.muscle_lengths is not None or robot.n_springs > 48:
         assert not found.any()
         return
     assert np.mean(found) > 0.7  # others, beside a tendon that goes slack or at rounding, are left to the row

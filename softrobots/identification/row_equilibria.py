@@ -33,7 +33,7 @@ from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import MOMENT_FLOOR
 from softrobots.statics.elastostatics import CLEARLY, LARGEST_STEP
 
-_MOST = 24  # elastic coordinates; beyond, a search for each row is as fast
+_MOST = 48  # elastic coordinates; beyond, a search for each row is as fast
 _MOST_STEPS = 8
 _SHRINKS = 0.5  # share of the residual that a step leaves at most
 _MOST_TOGETHER = 60  # steps of rows that follow one another

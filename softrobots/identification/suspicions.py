@@ -51,6 +51,7 @@ _MUCH = 0.1  # share of the variance that no robot with the right columns leaves
 _TO_STD = 1.4826  # standard deviation of normal numbers over the median of their size
 _BADLY = 2.0  # times the standard deviation that was given, above which noise alone is no explanation
 _FAR = 3.5  # standard deviations of its prior; of 50 parameters one is farther off in one of 40 fits
+_LOOSE = 0.5  # standard error of a logarithm, and a change, above which a value is no more than a bound
 _EARTH = (9.76, 9.84)  # gravity on the ground [m/s^2]
 
 
@@ -98,7 +99,7 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
                     f"{key}: what is left is {ratio:.2g} times the standard deviation that was given: the robot differs in "
                     f"what is not fitted{weight}, or the standard deviation is larger; the intervals by rows are too narrow"
                 )
-    return (texts or value_units(found)) + far + _tied(found)
+    return (texts or value_units(found)) + far + _run_off(found) + _tied(found)
 
 
 def suspicions(
@@ -189,9 +190,23 @@ def _far_from_priors(found: Identification) -> list[str]:
     if not far:
         return []
     named = ", ".join(f"{name} {off[name]:+.2g}" for name in far[:6]) + (f" and {len(far) - 6} more" if far[6:] else "")
+    weight = "" if "gravity" in found.fitted.measurements.loads else "; and does it feel its weight, since gravity is not given"
     return [
         f"far from what was known before, in standard deviations of the prior: {named}; are the sizes of the robot and the "
-        "priors right, and order and sign of the actuators?"
+        f"priors right, and order and sign of the actuators{weight}?"
+    ]
+
+
+def _run_off(found: Identification) -> list[str]:
+    """The positive parameters that ended far from their start, where the measurements tell no more than a bound."""
+    return [
+        f"{one.name} has gone from {one.value:.4g} to {found.values[one.name]:.4g} {one.unit}, with a standard error of "
+        f"{100.0 * std:.0f} %: the measurements only tell that it is {'large' if ratio > 0.0 else 'small'}; give it a prior"
+        for one, std in zip(found.parameters, found.by_rows.std.tolist(), strict=True)
+        if one.logarithmic
+        and one.name not in found.priors
+        and std > _LOOSE
+        and abs(ratio := math.log(max(found.values[one.name], 1e-300) / max(one.value, 1e-300))) > _LOOSE
     ]
 
 
