@@ -309,7 +309,7 @@ def test_a_reversed_segment_and_all_reversed_tendons_are_told_behind_a_free_base
     for signs, words in (((-1, -1, -1, 1, 1, 1), "-1, -2, -3, 4, 5, 6"), ((-1,) * 6, "-1, -2, -3, -4, -5, -6")):
         rows = sr.Measurements(arm.relaxed_motors + moves * signs, tip_position=tips, std=5e-4)
         fit = sr.identify(arm, rows, ("base.position", "base.rotation"), max_iterations=1)
-        ((told, after, before),) = reversed_actuators(fit, "positions.tip", slice(None), False)
+        told, after, before = reversed_actuators(fit, "positions.tip", slice(None), False)
         assert (told, after < 1e-3 * before) == (words, True)
 
 

@@ -13,7 +13,7 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
@@ -109,7 +109,8 @@ def identify(
 
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
     values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
-    calm, weights, near = chosen.frictionless(), cast(Any, None), None
+    calm, near = chosen.frictionless(), None
+    weights: Any = None
     stages: list[tuple[ParameterSet, int, Stage]] = [(chosen, 1, "whole" if in_order else "last")]
     stages[:0] = [(calm, 1, "first")] * (calm is not chosen)
     stages[:0] = [(calm, every, "first")] * (every > 1 and _sees_all(rows, counted, every))

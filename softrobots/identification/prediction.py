@@ -11,7 +11,7 @@ or given lengths, where they are differences of the whole course.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from functools import cached_property
 from typing import Any, NamedTuple
 
@@ -30,11 +30,9 @@ from softrobots.identification.measurements import Measurements
 from softrobots.identification.model_change import ModelChange, model_change
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.residual_derivatives import AdjointRows, EquilibriumDerivatives
-from softrobots.identification.row_equilibria import balanced_course, balanced_rows
-from softrobots.model.friction_coordinates import after_step, memory_of, remembering, untouched
+from softrobots.identification.row_equilibria import balanced_course, balanced_rows, searched_rows
 from softrobots.model.numbers import LAW
 from softrobots.model.soft_model import SoftModel
-from softrobots.statics.elastostatics import balanced_state
 
 _TOLERANCE = 1e-12  # of residuals, relative to the load: derivatives are taken there
 _KEPT = 4, 24, 200_000  # least and most values whose equilibria are kept (from other starts there may be none), and rows of all
@@ -222,18 +220,13 @@ class Predictor:
         measurements, (_, turn) = self.measurements, self.parameters.base(values)
         motors = measurements.motor_coordinates(model) + self.parameters.motor_offsets(values)
         loads = loads_on(model, measurements.loads, np.asarray(pin.exp3(turn)))
-        starts = np.tile(model.rest, (len(motors), 1)) if self._springs is None else self._springs.copy()
-        states, sliders = States.at(model, motors, starts, loads), None
+        starts = np.tile(model.rest, (len(motors), 1)) if self._springs is None else self._springs
+        states, sliders = States.at(model, motors, starts.copy(), loads), None
         if self.in_order:
-
-            def alone(sliders: FloatArray, rows: range) -> bool:
-                return not self._search(model, states, rows, sliders)
-
-            sliders, known = balanced_course(model, states, self._sliders, _TOLERANCE, alone)
-            self.lost = self._search(model, states, range(known, len(motors)), sliders)
+            sliders, self.lost = balanced_course(model, states, self._sliders, _TOLERANCE)
         else:
-            found = balanced_rows(model, states, _TOLERANCE)
-            self.lost = self._search(model, states, np.flatnonzero(~found).tolist(), None)
+            rest = np.flatnonzero(~balanced_rows(model, states, _TOLERANCE)).tolist()
+            self.lost = searched_rows(model, states, rest, starts, _TOLERANCE)
         if self.lost and not self.gaps:
             more = f" and {len(self.lost) - 10} more" if len(self.lost) > 10 else ""
             words = ", ".join(map(measurements.where, self.lost[:10])) + more + " have none"
@@ -242,32 +235,6 @@ class Predictor:
             raise ParameterError("measurements", measurements, requirement)
         self._springs, self._sliders = states.q_springs, sliders
         return states, sliders
-
-    def _search(self, model: SoftModel, states: States, rows: Sequence[int], sliders: FloatArray | None) -> list[int]:
-        """Search some rows from those of the values before, then from rest or the row before; return those without any.
-
-        With memory, the sliders before the first of them are given, and those before the others filled in.
-        """
-        now, before, lost = model, np.asarray(model.rest), []
-        if sliders is not None and len(rows):
-            now = remembering(model, memory_of(untouched(model))._replace(bending=sliders[rows[0]]))
-            before = states.q_springs[rows[0] - 1] if rows[0] else before
-        cases = load_cases({name: load[rows] for name, load in states.loads.items()}, len(rows))
-        for row, case in zip(rows, cases, strict=True):
-            state, starts = None, [before] if self._springs is None else [self._springs[row], before]
-            if sliders is not None:
-                sliders[row] = memory_of(now).bending
-                starts[:-1] = [before + one - self._springs[max(row - 1, 0)] for one in starts[:-1]]  # type: ignore[index]
-            for start in starts:  # with memory as far from the row before as it was: what stuck still sticks
-                state = state or balanced_state(now, states.q_motors[row], case, start, tolerance=_TOLERANCE)
-            if state is None:
-                lost.append(row)
-                continue
-            states.q_springs[row], states.tangent[row] = state.q_springs, state.tangent
-            states.actuator_loads[row], states.coupling[row] = state.load.motors, state.load.coupling
-            if sliders is not None:
-                now, before = after_step(now, states.q_motors[row], state.q_springs), state.q_springs
-        return lost
 
 
 def _position(prediction: Prediction, key: str, measured: FloatArray) -> Seen:

@@ -88,7 +88,7 @@ def other_loads(found: Identification, key: str, few: slice, progress: bool | st
     ]
 
 
-def reversed_actuators(found: Identification, key: str, few: slice, progress: bool | str) -> list[tuple[str, float, float]]:
+def reversed_actuators(found: Identification, key: str, few: slice, progress: bool | str) -> tuple[str, float, float]:
     """The signs of actuators that explain most of positions, and the share of the variance that they and those given leave.
 
     Each choice of signs counts by what one linear step of all parameters within their priors would leave, from where the fit
@@ -98,7 +98,7 @@ def reversed_actuators(found: Identification, key: str, few: slice, progress: bo
     rows = found.fitted.measurements[few]
     start, names, n = _at_start(found), found.names, rows.q_motors.shape[1]
     if Predictor(start, rows).by_differences:  # which would take minutes
-        return []
+        return "", 1.0, 1.0
     points, middle = rows.measured[key], 0.0 if rows.relative else start.present.relaxed_motors
     points = points[:, :3, 3] if points.ndim == 3 else points
     whole = float(np.nansum((points - np.nanmean(points, axis=0)) ** 2))
@@ -128,7 +128,7 @@ def reversed_actuators(found: Identification, key: str, few: slice, progress: bo
         if not min(each) < shares[-1]:
             break
         signs, shares = tried[int(np.argmin(each))], [*shares, min(each)]
-    return [(", ".join(str(int(number * sign)) for number, sign in enumerate(signs, start=1)), shares[-1], shares[0])]
+    return ", ".join(str(int(number * sign)) for number, sign in enumerate(signs, start=1)), shares[-1], shares[0]
 
 
 def load_units(found: Identification) -> list[str]:

@@ -1,9 +1,7 @@
 r"""Equilibria of many rows at once, by Newton's method from starts that are near.
 
-The residual `r` of all rows and the tangent stiffness :math:`K_t = \partial r / \partial y` come from the same arrays as the
-derivatives of equilibria (`softrobots.identification.residual_derivatives`): in a virtual motion of unit rate of an elastic
-coordinate the work is :math:`-r`, and its derivative :math:`-K_t`. A row whose residual each step does not halve at least, or
-that does not end in a stable equilibrium, is left to the search for a single one.
+A row whose residual `r` each step does not halve at least, or that does not end in a stable equilibrium, is left to the search
+for a single one.
 
 Rows that follow one another with dry friction are solved together. With the bending `b` of a section, its slider `c` before
 the row and the moment of friction :math:`\tau` within the disc of the limit `L` (`softrobots.model.dry_friction`; `s` is the
@@ -18,7 +16,7 @@ row depends on those before through its slider only, so that a step substitutes 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any, cast
 
 import numpy as np
@@ -26,12 +24,14 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.identification.derivatives.friction_derivatives import SliderStates
 from softrobots.identification.derivatives.rows_and_states import States
+from softrobots.identification.measured_robot import load_cases
 from softrobots.identification.residual_derivatives import EquilibriumDerivatives
 from softrobots.model.dry_friction import BENDING_STICK
+from softrobots.model.friction_coordinates import after_step, memory_of, remembering, untouched
 from softrobots.model.soft_model import SoftModel
 from softrobots.model.springs import POSITIVE
 from softrobots.statics.elastic_state import MOMENT_FLOOR
-from softrobots.statics.elastostatics import CLEARLY, LARGEST_STEP
+from softrobots.statics.elastostatics import CLEARLY, LARGEST_STEP, balanced_state
 
 _MOST = 48  # elastic coordinates; beyond, a search for each row is as fast
 _MOST_STEPS = 8
@@ -76,32 +76,28 @@ def balanced_rows(model: SoftModel, whole: States, tolerance: float) -> Any:
 
 
 def balanced_course(
-    model: SoftModel,
-    starts: States,
-    sliders: FloatArray | None,
-    tolerance: float,
-    alone: Callable[[FloatArray, range], bool],
-) -> tuple[FloatArray, int]:
-    """Search for equilibria that follow one another; none are found of robots as above, or with friction of guides.
+    model: SoftModel, whole: States, sliders: FloatArray | None, tolerance: float
+) -> tuple[FloatArray, list[int]]:
+    """Find equilibria that follow one another, together where only sections rub, where that fails one by one.
 
     Args:
         model: The robot, with dry friction.
-        starts: States of all rows with the elastic coordinates to start from, which are changed to those that are found.
+        whole: States of N rows with the elastic coordinates to start from, which are changed to those that are found.
         sliders: Sliders before each of these, shape (N, n_sections, 2) [rad]; None: nothing rubs there.
         tolerance: Residual that counts as none, relative to the torques of the springs.
-        alone: Searches some rows one by one, with the sliders before each row, for the states; false if not all are found.
 
     Returns:
-        The sliders before each, shape (N, n_sections, 2) [rad], and how many rows, from the first on, are found.
+        The sliders before each row, shape (N, n_sections, 2) [rad], and the rows without an equilibrium.
     """
-    friction, y, n, first = cast(Any, model.structure.friction), starts.q_springs, len(starts.q_springs), 0
+    starts = whole.q_springs.copy()
+    friction, y, n, first = cast(Any, model.structure.friction), whole.q_springs, len(starts), 0
     waiting, least = 0, n
     places, limit, flexible = friction.places, friction.limit[:, None], BENDING_STICK / friction.limit[:, None]
     before = np.zeros((n, *places.shape))
     before[0] = friction.untouched.bending
     tau = np.zeros(before.shape) if sliders is None else SliderStates(friction, y, sliders).torque * limit
-    for _ in range(_MOST_TOGETHER if not friction.guided and _is_solvable(model, starts.loads) else 0):
-        evaluated = None if first == n else _evaluated(model, starts, np.arange(first, n), tolerance)
+    for _ in range(_MOST_TOGETHER if not friction.guided and _is_solvable(model, whole.loads) else 0):
+        evaluated = None if first == n else _evaluated(model, whole, np.arange(first, n), tolerance)
         if evaluated is None:
             break
         states, residual, allowed = evaluated
@@ -115,20 +111,52 @@ def balanced_course(
         done = np.maximum(np.linalg.norm(left, axis=1), np.linalg.norm(unbalanced, axis=1)) <= allowed
         ready = int(np.argmin([*done, False]))
         ready = int(np.argmin([*_is_stable(model, states.tangent[:ready]), False]))
-        _put(starts, np.arange(first, first + ready), states, np.arange(ready))
+        _put(whole, np.arange(first, first + ready), states, np.arange(ready))
         if first + ready == n:
-            return before, n
+            return before, []
         steps, turns = _steps(tangent, unbalanced, tau[first:], after[first:] - before[first:], friction)
         wrong, first = int(np.count_nonzero(~done)), first + ready
         waiting, least = 0 if wrong < _FEWER * least else waiting + 1, min(wrong, least)
         y[first:], tau[first:] = y[first:] + steps[ready:], tau[first:] + turns[ready:]
         if waiting == _WAITING:
             some, waiting = slice(first, first + _FEW), 0
-            if alone(before, range(n)[some]):
+            if not searched_rows(model, whole, range(n)[some], starts, tolerance, before):
                 tau[some] = limit * SliderStates(friction, y[some], before[some]).torque
                 first = min(first + _FEW, n)
                 before[first : first + 1] = y[first - 1, places] - flexible * tau[first - 1]
-    return before, first
+    return before, searched_rows(model, whole, range(first, n), starts, tolerance, before)
+
+
+def searched_rows(
+    model: SoftModel,
+    whole: States,
+    rows: Sequence[int],
+    starts: FloatArray,
+    tolerance: float,
+    sliders: FloatArray | None = None,
+) -> list[int]:
+    """Search some rows one by one for their states, from starts, then from rest or the row before; return those without any.
+
+    With memory, the sliders before the first of them are given, and those before the others filled in.
+    """
+    now, before, lost = model, np.asarray(model.rest), []
+    if sliders is not None and len(rows):
+        now = remembering(model, memory_of(untouched(model))._replace(bending=sliders[rows[0]]))
+        before = whole.q_springs[rows[0] - 1] if rows[0] else before
+    for row, case in zip(rows, load_cases({name: load[rows] for name, load in whole.loads.items()}, len(rows)), strict=True):
+        state, start = None, starts[row]
+        if sliders is not None:  # as far from the row before as it was: what stuck still sticks
+            sliders[row], start = memory_of(now).bending, before + start - starts[max(row - 1, 0)]
+        for one in (start, before):
+            state = state or balanced_state(now, whole.q_motors[row], case, one, tolerance=tolerance)
+        if state is None:
+            lost.append(row)
+            continue
+        whole.q_springs[row], whole.tangent[row] = state.q_springs, state.tangent
+        whole.actuator_loads[row], whole.coupling[row] = state.load.motors, state.load.coupling
+        if sliders is not None:
+            now, before = after_step(now, whole.q_motors[row], state.q_springs), state.q_springs
+    return lost
 
 
 def _steps(

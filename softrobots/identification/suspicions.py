@@ -74,11 +74,9 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
         if placed and bad:
             texts += _other_frame(found, key, rows[few], _unexplained(measured[few], predicted[few]))
         if placed and (bad or far) and len(texts) == before:  # values far from what was known may hide reversed actuators
-            for order, after, start in reversed_actuators(found, key, few, progress):
-                if start > UNEXPLAINED and after < FAR_LESS * start:
-                    texts.append(
-                        f"{key}: taking the actuators as {order} {_words(after, start)}, after a linear step of the fit"
-                    )
+            order, after, start = reversed_actuators(found, key, few, progress)
+            if start > UNEXPLAINED and after < FAR_LESS * start:
+                texts.append(f"{key}: taking the actuators as {order} {_words(after, start)}, after a linear step of the fit")
         if placed and bad:
             texts += other_axes(found, key, few, progress) if len(texts) == before else []
         if placed and (bad or rescaled(found)) and not texts:
@@ -99,7 +97,7 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
                     f"{key}: what is left is {ratio:.2g} times the standard deviation that was given: the robot differs in "
                     f"what is not fitted{weight}, or the standard deviation is larger; the intervals by rows are too narrow"
                 )
-    return (texts or value_units(found)) + far + _run_off(found) + _tied(found)
+    return (texts or value_units(found) + _run_off(found)) + far + _tied(found)
 
 
 def suspicions(
