@@ -341,3 +341,27 @@ def test_a_noisy_fit_is_not_called_mirrored(cases: int) -> None:
         tried += bool(np.sum(left**2) > 0.02 * np.sum((tips - tips.mean(axis=0)) ** 2))
         assert not [text for text in hints(fit) if "fitting again" in text or "taken for" in text], seed
     assert tried > 0.3 * cases  # fits so bad that axes are suspected
+
+
+def test_a_stiffness_that_only_has_a_bound_is_told(rng: np.random.Generator) -> None:
+    """A rod of 39 kN stretches by 0.01 mm under its tendons, where the tip is seen to 0.3 mm; 1 kN would show."""
+    arm = sr.TendonArm(segment_lengths=(0.1,), elastic_sections=1)
+    model, pulls = sr.load_model(arm), rng.uniform(-1e-3, 2e-3, (12, 3))
+    tips = np.array([sr.solve_equilibrium(model, model.relaxed_motors - pull).tip_position for pull in pulls])
+    seen, known = tips + 3e-4 * rng.standard_normal(tips.shape), {"positions.tip": 3e-4}
+    rows = sr.Measurements(pulls, tip_position=seen, std=known, relative=True, markers={"tip": "tip"})
+    start = sr.TendonArm(segment_lengths=(0.1,), elastic_sections=1, axial_stiffness=1e3)
+    told = hints(sr.identify(start, rows, ("axial_stiffness", "tendon_pretension")))
+    assert any(
+        text.startswith("axial_stiffness has gone from 1000 to") and "only tell that it is large" in text for text in told
+    )
+    fixed = sr.identify(start, rows, "axial_stiffness", priors={"axial_stiffness": (4e4, 1e4)})
+    assert not any("has gone from" in text for text in hints(fixed))
+
+
+def test_friction_of_guides_in_many_rows_is_warned_of() -> None:
+    """Its derivatives are differences of the whole course."""
+    for count, guides, told in ((201, 0.3, 1), (201, 0.0, 0), (20, 0.3, 0)):
+        arm = sr.TendonArm(segment_lengths=(0.1,), elastic_sections=1, guide_friction=guides)
+        rows = sr.Measurements(np.zeros((count, 3)), relative=True, motor_torques=np.zeros((count, 3)))
+        assert sum("guide_friction" in text for text in doubtful_sizes(rows, sr.load_model(arm))) == told

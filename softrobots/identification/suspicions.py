@@ -51,6 +51,7 @@ _MUCH = 0.1  # share of the variance that no robot with the right columns leaves
 _TO_STD = 1.4826  # standard deviation of normal numbers over the median of their size
 _BADLY = 2.0  # times the standard deviation that was given, above which noise alone is no explanation
 _FAR = 3.5  # standard deviations of its prior; of 50 parameters one is farther off in one of 40 fits
+_MOST_ROLLED = 200  # rows of a robot with friction of guides that a fit goes through in minutes
 _LOOSE = 0.5  # standard error of a logarithm, and a change, above which a value is no more than a bound
 _EARTH = (9.76, 9.84)  # gravity on the ground [m/s^2]
 
@@ -178,6 +179,11 @@ def doubtful_sizes(measurements: Measurements, model: SoftModel) -> list[str]:
         size = float(np.linalg.norm(measurements.loads["gravity"], axis=1).max())
         if size and not _EARTH[0] < size < _EARTH[1]:
             found.append(f"gravity is {size:.4g} m/s^2, on the ground 9.81: is the unit right?")
+    if model.structure.guided and len(measurements) > _MOST_ROLLED:
+        found.append(
+            f"with guide_friction a step of a fit rolls {len(measurements)} rows out twice a parameter, maybe for hours: "
+            "leave it out, as bending_friction stands for much of it, or take fewer rows"
+        )
     return found
 
 
