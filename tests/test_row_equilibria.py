@@ -92,3 +92,20 @@ def test_rows_that_follow_one_another_are_those_of_a_trajectory(
         scale = 1.0 / np.sqrt(arm.stiffness)
         stiffness = (scale[:, None] * one * scale for one in (states.tangent[row], now.tangent_stiffness))
         np.testing.assert_allclose(*stiffness, rtol=1e-5, atol=1e-5)  # of slip: over its length, down to a stick
+
+
+def test_rows_that_cannot_be_solved_together_are_found_one_by_one(monkeypatch: pytest.MonkeyPatch) -> None:
+    arm = sr.load_model(sr.TendonArm(segment_lengths=(0.06, 0.07), elastic_sections=1, bending_friction=3e-3))
+    motors = arm.relaxed_motors - np.outer(np.r_[0.0:1.0:5j, 0.8:0.0:5j], [3e-3, -1e-3, 0.0, 1e-3, 4e-3, -2e-3])
+    together, alone = (States.at(arm, motors, np.tile(arm.rest, (10, 1)), {}) for _ in range(2))
+    sliders, lost = balanced_course(arm, together, None, 1e-12)
+
+    def singular(*_: object) -> None:
+        raise np.linalg.LinAlgError
+
+    monkeypatch.setattr(row_equilibria, "_steps", singular)
+    others, more = balanced_course(arm, alone, None, 1e-12)
+    assert not lost and not more
+    # the rounding of the moments of friction over the softest direction, as above
+    np.testing.assert_allclose(together.q_springs, alone.q_springs, rtol=0, atol=1e-8)
+    np.testing.assert_allclose(sliders, others, rtol=0, atol=1e-8)

@@ -114,8 +114,11 @@ def balanced_course(
         _put(whole, np.arange(first, first + ready), states, np.arange(ready))
         if first + ready == n:
             return before, []
-        steps, turns = _steps(tangent, unbalanced, tau[first:], after[first:] - before[first:], friction)
-        wrong, first = int(np.count_nonzero(~done)), first + ready
+        wrong, off, first = int(np.count_nonzero(~done)), (after - before)[first:], first + ready
+        try:
+            steps, turns = _steps(tangent, unbalanced, tau[first - ready :], off, friction)
+        except np.linalg.LinAlgError:
+            break
         waiting, least = 0 if wrong < _FEWER * least else waiting + 1, min(wrong, least)
         y[first:], tau[first:] = y[first:] + steps[ready:], tau[first:] + turns[ready:]
         if waiting == _WAITING:
