@@ -12,8 +12,9 @@ Curtis, M. J. D. Powell, J. K. Reid, IMA Journal of Applied Mathematics 13:117-1
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from functools import lru_cache
-from typing import Any, NamedTuple
+from dataclasses import dataclass, field
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
 
@@ -43,7 +44,8 @@ def numbers_of(model: SoftModel) -> Numbers:
     return model_numbers(model)
 
 
-class ModelChange(NamedTuple):
+@dataclass(frozen=True, eq=False)
+class ModelChange:
     """Derivatives of the numbers of a model by parameters."""
 
     n_parameters: int
@@ -53,6 +55,7 @@ class ModelChange(NamedTuple):
 
     `placements` and `frames` change by twists of six rows each, in the joint before: linear part at its origin, then angular.
     """
+    _stacked: dict[tuple[str, ...], tuple[list[int], FloatArray]] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, size: int, base: Numbers, slopes: Iterable[tuple[int, str, FloatArray]]) -> ModelChange:
@@ -63,13 +66,26 @@ class ModelChange(NamedTuple):
             columns.setdefault(name, np.zeros((column.size, size)))[:, place] = column
         return cls(size, columns)
 
-    def along(self, name: str, rows: FloatArray) -> FloatArray | float:
-        """Return the change of rows of outputs, shape (N, L, P), from their derivatives by a number, shape (N, L, ...)."""
-        if name not in self.by_number:
-            return 0.0
-        change = self.by_number[name]
-        count, number = rows.shape[:2]
-        return np.asarray(rows.reshape(count * number, len(change)) @ change).reshape(count, number, self.n_parameters)
+    def along(self, rows: Mapping[str, FloatArray]) -> FloatArray:
+        """Return the change of rows of outputs, shape (N, L, P), from their derivatives by some numbers, shapes (N, L, ...).
+
+        Those by placements are those of the joints `moved` alone.
+        """
+        names = tuple(name for name in rows if name in self.by_number)
+        if names not in self._stacked:
+            flat = [self.moved[1] if name == "placements" else self.by_number[name] for name in names]
+            self._stacked[names] = [len(one) for one in flat], np.concatenate(flat)
+        sizes, stacked = self._stacked[names]
+        shape = rows[names[0]].shape[:2]
+        each = [rows[name].reshape(*shape, size) for name, size in zip(names, sizes, strict=True)]
+        return np.asarray(np.concatenate(each, axis=-1).reshape(-1, len(stacked)) @ stacked).reshape(*shape, self.n_parameters)
+
+    @cached_property
+    def moved(self) -> tuple[Any, FloatArray]:
+        """The joints whose placements change, k of them, and their rows of `placements`, shape (6 k, P)."""
+        twists = self.by_number["placements"].reshape(-1, 6, self.n_parameters)
+        joints = np.flatnonzero(np.any(twists, axis=(1, 2)))
+        return joints, twists[joints].reshape(-1, self.n_parameters)
 
 
 def model_change(
@@ -180,7 +196,7 @@ def _apart(parameters: ParameterSet, numbers: Callable[[FloatArray], Numbers]) -
 
 @lru_cache(maxsize=32)
 def present_change(parameters: ParameterSet) -> ModelChange:
-    """Return `model_change` about the values that a robot has, found once.
+    """Return `model_change` about the values that a robot has, found once, with the `direct_slopes` of its parameters.
 
     Raises:
         ParameterError: If a name is that of several parts whose values differ; or as `model_change` does.
@@ -189,7 +205,8 @@ def present_change(parameters: ParameterSet) -> ModelChange:
     if any(not np.allclose(present[name], loaded[name], rtol=1e-9, atol=1e-12) for name in present):
         requirement = "names of numbers with the values that the robot has: one name of several parts ties them to one value"
         raise ParameterError("parameters", parameters.names, requirement)
-    return model_change(parameters, fourth_order=True)
+    change = model_change(parameters, fourth_order=True)
+    return ModelChange(change.n_parameters, {**change.by_number, **parameters.direct_slopes})
 
 
 def differences(

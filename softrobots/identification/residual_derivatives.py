@@ -17,6 +17,7 @@ At a knee (the end of a plateau, a tendon that goes slack) they are the derivati
 from __future__ import annotations
 
 import contextlib
+from collections.abc import Mapping
 from functools import cached_property
 from typing import Any
 
@@ -104,7 +105,7 @@ class EquilibriumDerivatives:
         with contextlib.suppress(np.linalg.LinAlgError):
             inverse: FloatArray = np.asarray(np.linalg.inv(tangent), dtype=np.float64)
             squares = stiffness @ (inverse * inverse) @ stiffness  # as in `inverse_stiffness`: far from neutral
-            if np.all(squares < POSITIVE**-2):
+            if (squares < POSITIVE**-2).all():
                 return inverse
         return np.array([inverse_stiffness(self.model, one) for one in tangent])
 
@@ -121,7 +122,7 @@ class EquilibriumDerivatives:
     def on_strains(self, on_joints: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Loads on motor joints, (N, L, n_joint_motors), and strains, (N, L, n_strains), of those on joints, (N, L, n)."""
         structure = self.model.structure
-        motors, strains = on_joints[..., structure.motor_indices], on_joints[..., structure.spring_indices]
+        motors, strains = (on_joints.take(one, -1) for one in (structure.motor_indices, structure.spring_indices))
         if self.sections is None:
             return motors, strains
         by_section = (on_joints[..., self.sections][..., None, :] @ self.chain.first[:, None])[..., 0, :]
@@ -249,12 +250,11 @@ class AdjointRows:
         """Derivatives of what actuators do, by strains, and by their numbers."""
         return actuators.slopes(self._lengths, self._weights[..., self._at.n_joint_motors :], self.virtual)
 
-    def by_numbers(self, change: ModelChange) -> FloatArray:
-        """Derivatives of the outputs by the parameters of a change of the model, shape (N, L, P)."""
-        at, total = self._at, np.zeros((*self.virtual.shape[:2], change.n_parameters))
-        found, changed = dict[str, FloatArray](), change.by_number.keys()
+    def by_numbers(self, change: ModelChange, direct: Mapping[str, FloatArray] | None = None) -> FloatArray:
+        """Derivatives of the outputs by the parameters of a change, (N, L, P), with those by what is set `direct`, by name."""
+        at, found, changed = self._at, dict(direct or {}), change.by_number.keys()
         if changed & _OF_SECTIONS:
-            found = at.by_sections(self._motion[1], self.virtual)
+            found |= at.by_sections(self._motion[1], self.virtual)
         if at.actuators is not None and changed & OF_ACTUATORS:
             found |= self._of_actuators(at.actuators)[1]
         if at.is_held and at.actuators is not None and "held_slopes" in changed:
@@ -263,19 +263,18 @@ class AdjointRows:
             found["masses"] = np.swapaxes(by_masses, 1, 2)
         if changed & _OF_SPRINGS:
             found |= at.springs.slopes(self.virtual)
-        for name, rows in found.items():
-            total += change.along(name, rows)
         if "placements" in changed:
-            placements = change.by_number["placements"].reshape(-1, 6, change.n_parameters)
-            moved = np.any(placements, axis=(1, 2))
-            by_placement = at.tree.at_placements(self._motion[1], moved)
-            total += (by_placement @ placements[moved]).sum(axis=1)
+            found["placements"] = np.swapaxes(at.tree.at_placements(self._motion[1], change.moved[0]), 1, 2)
+        total = change.along(found) if found else np.zeros((*self.virtual.shape[:2], change.n_parameters))
         if "frames" in changed:
-            frames = change.by_number["frames"].reshape(-1, 6, change.n_parameters)
-            for name, rows in at.tree.by_frames(self._motion[0]).items():
-                total += rows @ frames[at.model.frame_id(name)]
+            frames, by_frame = (
+                change.by_number["frames"].reshape(-1, 6, change.n_parameters),
+                at.tree.by_frames(self._motion[0]),
+            )
             if self._outputs.pose is not None:
-                total += self._pose[1] @ frames[at.model.frame_id(self._outputs.frame)]
+                by_frame[self._outputs.frame] = self._pose[1] + by_frame.get(self._outputs.frame, 0.0)
+            for name, rows in by_frame.items():
+                total += rows @ frames[at.model.frame_id(name)]
         return total
 
     def by_loads(self) -> dict[str, FloatArray]:
@@ -284,8 +283,8 @@ class AdjointRows:
 
     def by_base(self) -> FloatArray:
         """Derivatives of the outputs by a motion of the base (position, then rotation) while loads stay, shape (N, L, 6)."""
-        tree, total = self._at.tree, np.zeros((*self.virtual.shape[:2], 6))
-        total += self._motion[1][:, tree.topology.parents < 0].sum(axis=1)
+        tree = self._at.tree
+        total: FloatArray = self._motion[1].take(tree.topology.roots, 1).sum(axis=1)
         if self._outputs.pose is not None and tree.frame(self._outputs.frame)[0] < 0:
             total += self._pose[1]
         return total

@@ -46,7 +46,8 @@ class States(NamedTuple):
         if any(one.load.gravity is not None for one in equilibria):
             loads[""] = np.array([one.load.gravity or (0.0, 0.0, 0.0) for one in equilibria])
         fields = ("q_motors", "q_springs", "motor_torques", "tangent_stiffness", "coupling")
-        motors, springs, torques, tangent, coupling = (np.array([getattr(one, name) for one in equilibria]) for name in fields)
+        each = [[getattr(one, name) for one in equilibria] for name in fields]
+        motors, springs, torques, tangent, coupling = (one[0][None] if len(one) == 1 else np.array(one) for one in each)
         return cls(motors, springs, loads, torques, tangent, coupling)
 
 
