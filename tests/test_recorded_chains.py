@@ -18,9 +18,14 @@ from softrobots.learning.recorded_chains import many_numbers
 DOWN = (0.0, 0.0, -9.81)
 OPTIONS: dict[str, Any] = dict(backend="python", threads=1, failed="raise")
 ARM = sr.InflatableArm(rest_up=0.1, payload=0.3)
-ARMS = {
+SLACK = sr.InflatableArm(link_model="two_hinges", moment_law="slack_wall", pressure=3e4)
+ARMS: dict[str, tuple[Any, tuple[str, ...]]] = {
     "arm": (ARM, ("link[*].stiffness", "hinge_offset", "link[*].wall_thickness", "link[*].radius", "link_lengths")),
     "two hinges": (sr.InflatableArm(link_model="two_hinges", torsion=True), ("radius", "density", "young_modulus")),
+    "slack wall": (SLACK, ("radius", "pressure", "density")),
+    "given spring": (sr.load_model(ARM, springs={"spring_1_up": 77.0}), ("stiffness", "hinge_offset")),
+    "joint springs": (ARM, ("joint[*].stiffness", "joint[spring_1_up].rest", "radius")),
+    "file": (sr.load_model(ARM.urdf()), ("joint[*].stiffness", "joint[*].rest")),
     "wrist": (sr.InflatableArm(wrist=(0.05, 0.1)), ("stiffness", "wrist_mass", "rest_side", "base_mass")),
 }
 
@@ -45,17 +50,26 @@ def test_numbers_of_many_robots_are_those_of_each_loaded_alone(name: str) -> Non
         assert numbers == pytest.approx(loaded(tuple(row.tolist())), rel=1e-12, abs=1e-15)
 
 
-def test_robots_with_given_springs_and_slack_walls_are_loaded() -> None:
-    """No tape tells their numbers: of springs of the caller, of joint springs that are parameters, and of slack moments."""
-    slack = sr.InflatableArm(link_model="two_hinges", moment_law="slack_wall", pressure=3e4)
-    model = sr.load_model(sr.InflatableArm(), springs={"spring_1_up": 77.0})
-    for robot, name in ((model, "stiffness"), (sr.InflatableArm(), "joint[*].stiffness"), (slack, "radius")):
-        given = ParameterSet.of(robot, name)
-        rows = given.values * np.array([[1.01], [0.99]])
-        assert np.isnan(many_numbers(given, rows, lambda at: numbers_of(given.model(at).chain()))).all()  # noqa: B023
+def test_joint_springs_of_a_slack_wall_are_loaded() -> None:
+    """They are to be alike at each hinge, which the loader checks."""
+    given = ParameterSet.of(
+        sr.InflatableArm(moment_law="slack_wall", pressure=3e4), "joint[spring_1_side,spring_1_up].stiffness"
+    )
+    rows = given.values * np.array([[1.01], [0.99]])
+    assert np.isnan(many_numbers(given, rows, lambda at: numbers_of(given.model(at).chain()))).all()
+    with pytest.raises(sr.ParameterError, match="structure of the robot"):
+        Differentiable("equilibrium", given.present, "joint[spring_1_up].stiffness", gravity=None, **OPTIONS)
 
 
-@pytest.mark.parametrize("name", ["arm", "wrist"])
+def test_a_joint_spring_that_is_not_positive_is_refused() -> None:
+    """It is a number of the chain, which nothing else looks at."""
+    solver = Differentiable("equilibrium", sr.load_model(ARM.urdf()), "joint[spring_1_up].stiffness", gravity=None, **OPTIONS)
+    for bad in (0.0, -90.0, np.nan):
+        with pytest.raises(sr.ParameterError, match=r"spring_1_up|finite"):
+            solver.solve(np.zeros(3), np.zeros(3), np.array([[90.0], [bad], [100.0]]))
+
+
+@pytest.mark.parametrize("name", ["arm", "slack wall", "joint springs", "file", "wrist"])
 def test_derivatives_by_parameters_of_each_row_are_differences_of_its_robot(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     """In both modes, which are transposes of each other; few robots are loaded for them."""
     robot, names = ARMS[name]
@@ -90,7 +104,7 @@ def test_derivatives_by_parameters_of_each_row_are_differences_of_its_robot(name
         )
         return np.concatenate([found.q_springs, found.tip_position])
 
-    step = 1e-3
+    step = 3e-4
     for row in range(count):
         near, far = (solved(row, one * step) - solved(row, -one * step) for one in (1.0, 2.0))
         slope = (8.0 * near - far) / (12.0 * step)
@@ -108,7 +122,7 @@ def test_rows_of_parameters_that_a_robot_refuses_are_told() -> None:
 
 
 def test_a_parameter_at_its_bound_has_derivatives_to_one_side() -> None:
-    """Rows beside it are read from the tape, and it is loaded."""
+    """Read from the tape as for rows beside it."""
     solver = Differentiable(
         "equilibrium", replace(ARM, cap_mass=0.1), "cap_mass", gravity=DOWN, backend="python", threads=1, failed="raise"
     )

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -40,6 +41,17 @@ ROBOTS: dict[str, tuple[Any, tuple[str, ...]]] = {
     ),
     "given tensions": (sr.load_model(sr.PccArm(elastic_sections=2), muscles="forces"), ("radius", "muscle_azimuth_deviation")),
     "helix": (sr.HelixTube(elastic_sections=6), ("young_modulus", "length", "wall_thickness", "density")),
+    "joint springs": (
+        sr.load_model(sr.PccArm(chain="lumped", elastic_sections=1), muscles="forces"),
+        ("joint[section_1_1_bend_x].stiffness", "joint[section_1_1_bend_y].rest", "linear_density"),
+    ),
+    "given spring": (
+        sr.load_model(sr.PccArm(chain="lumped", elastic_sections=1), springs={"section_1_1_bend_x": 77.0}, muscles="forces"),
+        ("bending_stiffness", "linear_density"),
+    ),
+    "plateau": (sr.InflatableArm(max_moment=30.0), ("link[*].max_moment", "radius", "cap_mass")),
+    "slack wall": (sr.InflatableArm(moment_law="slack_wall", pressure=3e4), ("pressure", "radius", "density")),
+    "springs of a file": (sr.load_model(sr.InflatableArm().urdf()), ("joint[*].stiffness", "joint[spring_1_up].rest")),
 }
 
 
@@ -67,17 +79,15 @@ def test_numbers_of_robots_change_as_those_of_loaded_ones(name: str) -> None:
 
 
 def test_robots_that_no_tape_tells_are_loaded() -> None:
-    """Springs of the caller, joint springs that are parameters, and largest moments are not in the tags that are read."""
-    lumped = sr.PccArm(chain="lumped", elastic_sections=2)
-    joint = sr.load_model(lumped).structure.spring_joints[0]
-    for robot, name in (
-        (sr.load_model(lumped, springs={joint: 77.0}), "bending_stiffness"),
-        (sr.load_model(lumped), "joint[*].stiffness"),
-        (sr.InflatableArm(max_moment=30.0), "max_moment"),
-    ):
-        given = ParameterSet.of(robot, name)
-        values = tuple((1.01 * given.values).tolist())
-        assert not RecordedModels(given).changes([values], [given.model(values)])
+    """Where the recorded expansion is gone, and where a parameter has no room to either side."""
+    given = ParameterSet.of(sr.PccArm(chain="lumped", elastic_sections=1), "linear_density")
+    values = tuple((1.01 * given.values).tolist())
+    model = given.model(values)
+    assert RecordedModels(given).changes([values], [model])
+    given.variants.expansions.tapes.clear()
+    assert not RecordedModels(given).changes([values], [model])
+    narrow = ParameterSet(given.present, (replace(given.parameters[0], lower=values[0], upper=values[0]),), {})
+    assert not RecordedModels(narrow).changes([values], [narrow.model(values)])
 
 
 @pytest.mark.parametrize("name", ["pcc", "tensions", "helix"])

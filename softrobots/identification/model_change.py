@@ -256,6 +256,23 @@ def _relative(
     raise ParameterError(some[0].name, float(values[0]), requirement + refusal)
 
 
+def neighbours(parameters: ParameterSet, rows: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return N rows of parameters and their neighbours, shape (1 + 2 P, N, P), and weights of the changes there, (2, N, P).
+
+    Of each parameter two, in turn, for central differences; at a bound to one side; NaN without room.
+    """
+    scales = np.array([scales_of(parameters, row) for row in rows]) * parameters.of_model
+    offsets, weights = np.full((2, 2, *rows.shape), np.nan)
+    for step, some in (_DOWNWARDS, _UPWARDS, CENTRAL):
+        each, shares = (np.array(list(one))[:, None, None] * parameters.of_model for one in (some, some.values()))
+        there = rows + each * step * scales
+        room = np.all((there >= parameters.lower) & (there <= parameters.upper), axis=0)
+        offsets = np.where(room, each * step * scales, offsets)
+        weights = np.where(room, shares / np.where(scales, step * scales, 1.0), weights)
+    units = np.eye(rows.shape[1])[:, None]
+    return rows + np.concatenate([np.zeros((1, *rows.shape)), *(units * one for one in offsets)]), weights
+
+
 def _scale(parameter: Parameter, value: float) -> float:
     return abs(value) if parameter.logarithmic else max(abs(value), _TYPICAL.get(parameter.unit, 1.0))
 

@@ -284,7 +284,7 @@ class AdjointRows:
     def by_base(self) -> FloatArray:
         """Derivatives of the outputs by a motion of the base (position, then rotation) while loads stay, shape (N, L, 6)."""
         tree = self._at.tree
-        total: FloatArray = self._motion[1].take(tree.topology.roots, 1).sum(axis=1)
+        total: FloatArray = self._motion[1].take(np.flatnonzero(tree.topology.parents < 0), 1).sum(axis=1)
         if self._outputs.pose is not None and tree.frame(self._outputs.frame)[0] < 0:
             total += self._pose[1]
         return total

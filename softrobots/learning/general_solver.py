@@ -43,6 +43,7 @@ class GeneralSolver:
         self._varied = None if compiled is None or compiled.unknowns.is_unrolled else VariedChains(compiled, parameters)
         self._at = lru_cache(maxsize=_KEPT)(self._model)
         self._recorded, self._changes = RecordedModels(parameters), dict[tuple[float, ...], ModelChange]()
+        self._alone = lru_cache(maxsize=4)(self._change)
 
     def read(self, each: Sequence[tuple[float, ...]], *, slopes: bool) -> None:
         """Find derivatives of many robots at once, if they are needed; `code` is then asked for each."""
@@ -62,10 +63,15 @@ class GeneralSolver:
         model, compiled, chain = self._at(values)
         change = ModelChange(size, {})
         if slopes:
-            change = self._changes.get(values) or model_change(self._parameters, values, model=model)
+            change = self._changes.get(values) or self._alone(values)
         robot = ChangingRobot(model, change, dict(zip(self._parameters.names, values, strict=True)), None)
         responses = GeneralResponses(robot, self._weight, compiled, chain)
         return responses, np.array(values).reshape(1, size), np.eye(size) if slopes else np.zeros((size, 0))
+
+    def _change(self, values: tuple[float, ...]) -> ModelChange:
+        """Return how the robot at values of the parameters changes with them."""
+        model = self._at(values)[0]
+        return self._recorded.changes([values], [model]).get(values) or model_change(self._parameters, values, model=model)
 
     def _model(self, values: tuple[float, ...]) -> tuple[SoftModel, CompiledModel | None, ChainResponses | None]:
         """Return the robot, its compiled solvers, and their derivatives; None where there are none."""

@@ -43,7 +43,7 @@ class NumberChanges:
         """Check many robots and read their numbers at once, or their derivatives, too; `code` is then asked for each."""
         different, given = list(dict.fromkeys(each)), self._parameters
         rows, changes = np.array(different), np.zeros((len(different), 0, 0))
-        if slopes and len(rows) > 1:
+        if slopes:
             numbers, changes = many_slopes(given, rows, self.numbers)
         else:
             for values in different:
@@ -85,8 +85,14 @@ class NumberChanges:
 
     def _slopes(self, values: tuple[float, ...]) -> FloatArray:
         """Return the derivatives of the numbers by the parameters, shape (n, P); zero of those that do not change the model."""
+        present = tuple(self._parameters.values.tolist())
+        if not self._parameters.entries and values != present:  # joint springs are numbers themselves
+            return self.slopes(present)
+        told: FloatArray = many_slopes(self._parameters, np.array([values]), self.numbers)[1][0]
+        if np.isfinite(told).all():
+            return told
         base = self._named(np.array(values))
-        slopes = np.zeros((base["numbers"].size, len(values)))
+        slopes: FloatArray = np.zeros((base["numbers"].size, len(values)))
         for place, _, slope in number_slopes(self._parameters, np.array(values), self._named, base):
             slopes[:, place] = slope
         return slopes

@@ -18,13 +18,14 @@ import numpy as np
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
-from softrobots.identification.model_change import CENTRAL, ModelChange, numbers_of, scales_of
+from softrobots.description.urdf_tags import SpringTag
+from softrobots.identification.model_change import ModelChange, neighbours, numbers_of, scales_of
 from softrobots.identification.parameters import ParameterSet
-from softrobots.learning.recorded_chains import Read, tree_columns
+from softrobots.learning.recorded_chains import OF_SPRING, Read, descriptions, largest_linear_moment, tree_columns
 from softrobots.model.assembly import elastic_parts
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscle_paths import MusclePaths
-from softrobots.model.numbers import Numbers, structure_numbers
+from softrobots.model.numbers import Numbers, strain_springs, structure_numbers
 from softrobots.model.soft_model import SoftModel
 
 _ASIDE = 1e-3  # how far from its present values the robot with the tags is, relative
@@ -44,45 +45,53 @@ class RecordedModels:
         given = self._parameters
         step = _ASIDE * scales_of(given, given.values) * np.random.default_rng(0).uniform(0.5, 1.0, len(given.values))
         with suppress(SoftRobotsError):
-            model = given.model(given.values + np.where(given.values + step < given.upper, step, -step))
-            return model if model.structure.tags.springs.keys() >= set(model.structure.spring_joints) else None
+            return given.model(given.values + np.where(given.values + step < given.upper, step, -step))
         return None
+
+    @cached_property
+    def _of_springs(self) -> ModelChange:
+        """The change by joint springs alone, which are themselves numbers of the robot."""
+        given, joints = self._parameters, self._parameters.present.structure.spring_joints
+        slopes = np.zeros((2, len(given.present.structure.strain_springs.names), len(given.names)))
+        for place, one in given.places("spring"):
+            slopes[one.place.parts[0], [joints.index(name) for name in one.place.names], place] = 1.0
+        return ModelChange(len(given.names), dict(zip(OF_SPRING, slopes, strict=True)))
 
     def changes(self, each: Sequence[tuple[float, ...]], models: Sequence[SoftModel]) -> dict[tuple[float, ...], ModelChange]:
         """Return `model_change` at values of the parameters, of the robots with them; not of those that no tape tells."""
-        given, found = self._parameters, dict[tuple[float, ...], ModelChange]()
-        if not given.entries or given.places("spring") or self._like is None:
+        given, found, rows = self._parameters, dict[tuple[float, ...], ModelChange](), np.array(each)
+        if not given.entries and not given.present.muscles:
+            return dict.fromkeys(each, self._of_springs)
+        if self._like is None:
             return found
-        rows, places = np.array(each), np.flatnonzero(given.of_model).tolist()
-        steps, units = CENTRAL[0] * np.array([scales_of(given, row) for row in rows]), np.eye(rows.shape[1])[places]
-        moved = rows[:, None] + np.stack([*units, *-units, np.zeros(rows.shape[1])]) * steps[:, None]
-        fields, size = moved[:, :, list(given.entries.values())], moved.shape[1]
-        left = np.flatnonzero(np.all((moved >= given.lower) & (moved <= given.upper), axis=(1, 2)))
-        for tape in tuple(given.variants.expansions.tapes):
-            if not left.size:
-                break
-            same = tape.read_many(np.concatenate(fields[left]))[0].reshape(len(left), size).all(axis=1)
-            own, left = left[same].tolist(), left[~same]
+        moved, weights = neighbours(given, rows)
+        for same, root, read in descriptions(given, np.concatenate(moved)):
+            own = [
+                row
+                for row, follows in enumerate(same.reshape(len(moved), -1).all(axis=0))
+                if follows and each[row] not in found
+            ]
             if not own:
                 continue
-            numbers_at = _numbers_like(self._like, tape.marked, tape.read_many(np.concatenate(fields[own]))[1], len(own) * size)
-            for first, row in enumerate(own):
-                base, near = numbers_of(models[row]), [numbers_at(first * size + number) for number in range(size)]
+            numbers_at = _numbers_like(self._like, root, read, len(same))
+            for row in own:
+                base, near = numbers_of(models[row]), [numbers_at(number) for number in range(row, len(same), len(rows))]
                 alike = all(one[name].shape == base[name].shape for one in near for name in base)
-                if not alike or not all(np.allclose(near[-1][name], base[name], 1e-11, 1e-13) for name in base):
+                if not alike or not all(np.allclose(near[0][name], base[name], 1e-11, 1e-13) for name in base):
                     continue
                 slopes = (
-                    (place, name, (up[name] - down[name]) / (2.0 * steps[row, place]))
-                    for place, up, down in zip(places, near, near[len(places) :], strict=False)
+                    (place, name, one * (up[name] - near[0][name]) + other * (down[name] - near[0][name]))
+                    for place, (up, down) in enumerate(zip(near[1:], near[1 + rows.shape[1] :], strict=False))
+                    for one, other in [weights[:, row, place]]
                     for name in base
                 )
                 found[each[row]] = ModelChange.of(rows.shape[1], base, (one for one in slopes if np.any(one[2])))
         return found
 
 
-def _numbers_like(model: SoftModel, marked: str, read: Read, count: int) -> Callable[[int], Numbers]:
+def _numbers_like(model: SoftModel, root: ElementTree.Element, read: Read, count: int) -> Callable[[int], Numbers]:
     """Return what tells `model_numbers` of robots that differ from one in numbers of their text, by the row of these."""
-    root, rigid, structure = ElementTree.fromstring(marked), model.pinocchio, model.structure
+    rigid, structure, laws = model.pinocchio, model.structure, strain_springs(model)
     parts, masses, placed = tree_columns(root, list(rigid.names)[1:], [np.eye(3)] * len(rigid.names), read)
     joints: dict[Any, Any] = {joint.get("name"): joint for joint in root.findall("joint")}
     ends = [placed(joints[one.name].find("child").get("link") if one.name in joints else one.name) for one in rigid.frames]
@@ -95,7 +104,11 @@ def _numbers_like(model: SoftModel, marked: str, read: Read, count: int) -> Call
         "placements": stacked([(turn.reshape(-1, 3, 3), at[..., None]) for turn, at in parts]),
         "frames": stacked([(turn, at[..., None]) for _, turn, at in ends]),
         "masses": stacked(masses[:-1]),
+        "moments": np.zeros((count, len(laws.groups))),
     }
+    for number, group in enumerate(laws.groups):
+        if group.linear_up_to is not None:
+            columns["moments"][:, [number]] = largest_linear_moment(root, laws.names[group.springs[0]], read)
     elements = {one.get("name"): one for one in root if one.tag.startswith("{") and one.get("name")}
     springs = {name: one for name, joint in joints.items() for one in joint.findall("{*}spring")}
     attributes = [part.attrib for one in (*elements.values(), *springs.values()) for part in one.iter()]
@@ -121,7 +134,7 @@ def _numbers_like(model: SoftModel, marked: str, read: Read, count: int) -> Call
         some: Any = [structure.tags.sections, structure.tags.lumped_sections, structure.muscles]
         sections, lumped, muscles = (tuple(changed(row, tag, elements.get(tag.name, root)) for tag in tags) for tags in some)
         tags = replace(structure.tags, sections=sections, lumped_sections=lumped)
-        stiff = {name: changed(row, structure.tags.springs[name], springs.get(name, root)) for name in structure.spring_joints}
+        stiff = {name: changed(row, SpringTag(*pair), springs.get(name, root)) for name, pair in model.spring_table.items()}
         table, strains = elastic_parts(rigid, tags, stiff, structure.spring_joints)
         around = (muscles, tuple((tag.length, tag.rest) for tag in (*sections, *lumped)))
         if around not in routes:
@@ -134,6 +147,6 @@ def _numbers_like(model: SoftModel, marked: str, read: Read, count: int) -> Call
     def numbers_at(row: int) -> Numbers:
         if keys[row] not in made:
             made[keys[row]] = of_structure(row)
-        return {"moments": numbers_of(model)["moments"], **{name: one[row] for name, one in columns.items()}, **made[keys[row]]}
+        return {name: one[row] for name, one in columns.items()} | made[keys[row]]
 
     return numbers_at

@@ -30,11 +30,7 @@ def equilibrium(
         robot: The robot: a dataclass of parameters, a `SoftModel`, or what `softrobots.compile` returns.
         parameters: Names of parameters of the robot, as for `softrobots.sensitivity`, and offsets of motors.
         gravity: Gravity, shape (3,) [m/s^2], world axes; None: weightless.
-        backend: "numba" or "python", as for `softrobots.compile`: short chains of joints, inflatable arms among them, in
-            microseconds a case; or "pinocchio": every robot without dry friction, solved from rest as by `solve_equilibrium`,
-            in tenths of a millisecond to milliseconds. By default compiled code where it has derivatives. Of what
-            `softrobots.compile` returns, results come from its batch solver, at other values of the parameters by a second code
-            that is made when they are first asked for, and derivatives are compiled, too.
+        backend: "numba", "python" or "pinocchio", see `softrobots.jax.equilibrium`.
         threads: Number of threads of compiled code.
         failed: What becomes of rows without a stable equilibrium: "raise" raises an error that names them, "nan" makes their
             results NaN and their gradients zero.

@@ -23,10 +23,10 @@ import pinocchio as pin
 
 from softrobots.core.checks import FloatArray
 from softrobots.core.vectors import cross, skew
+from softrobots.model.pinocchio_data import PinocchioData
 from softrobots.model.soft_model import SoftModel
 
 _FIRST_THEN_MASS, _MASS_THEN_FIRST = np.array([1, 2, 3, 0]), np.array([3, 0, 1, 2])
-_HERE = np.eye(4)
 _BLOCKS: FloatArray = np.zeros((6, 6, 6))  # matrices of forces and moments of 1
 _BLOCKS[:3, 3:, :3] = _BLOCKS[:3, :3, 3:] = _BLOCKS[3:, 3:, 3:] = -skew(np.eye(3))
 _TURNING = _BLOCKS.reshape(6, 36)
@@ -37,8 +37,6 @@ class Topology(NamedTuple):
 
     parents: Any
     """Joint before each joint, shape (n,); -1 at the base."""
-    roots: Any
-    """The joints that the base carries."""
     beyond: FloatArray
     """1 where the joint of the column is the joint of the row or beyond it, else 0, shape (n, n)."""
     axes: FloatArray
@@ -48,9 +46,9 @@ class Topology(NamedTuple):
 
 
 @lru_cache(maxsize=64)
-def topology(model: SoftModel) -> Topology:
+def topology(workspace: PinocchioData) -> Topology:
     """Return the order of the joints of a robot and their axes."""
-    rigid, data = model.workspace(None)
+    rigid, data = workspace.at(None)
     parents = np.array(list(rigid.parents)[1:], dtype=np.intp) - 1
     n = len(parents)
     beyond = np.zeros((n, n))
@@ -65,7 +63,7 @@ def topology(model: SoftModel) -> Topology:
     motions[:, 2] = motions[:, 1] @ motions[:, 1]
     motions[:, 3, :3, 3] = axes[:, :3]  # a joint turns or slides
     placements = np.array([one.homogeneous for one in list(rigid.jointPlacements)[1:]]).reshape(n, 1, 4, 4)
-    return Topology(parents, np.flatnonzero(parents < 0), beyond, axes, (placements @ motions).reshape(n, 4, 16))
+    return Topology(parents, beyond, axes, (placements @ motions).reshape(n, 4, 16))
 
 
 @lru_cache(maxsize=64)
@@ -87,8 +85,6 @@ class _Loaded(NamedTuple):
     """Joint that carries it; -1: the base."""
     point: FloatArray
     """Its position, shape (N, 3) [m]."""
-    arm: FloatArray
-    """Takes a row to its cross product with the position, shape (N, 3, 3)."""
     wrench: FloatArray
     """Force on it, then moment, shape (N, 6) [N, N m]."""
     turning: FloatArray
@@ -109,7 +105,7 @@ class LoadedTree:
             joints: Joint positions, shape (N, n) [rad or m].
             loads: Wrench by frame, shape (N, 6), and gravity, by the name "", shape (N, 3), world axes.
         """
-        self.topology = tree = topology(model)
+        self.topology = tree = topology(model.data)
         self._model, self._numbers, self._frames = model, numbers, dict[str, tuple[int, FloatArray, FloatArray, FloatArray]]()
         placed = _placed(tree, joints) if len(joints) > 1 else _placed_alone(model, joints[0])
         self.rotation, self.position = placed[..., :3, :3], placed[..., :3, 3]
@@ -135,7 +131,7 @@ class LoadedTree:
                 body, _, point, arm = self.frame(frame)
                 push = skew(wrench[:, :3])
                 own = push @ arm
-                self._loaded.append(_Loaded(frame, body, point, arm, wrench, np.concatenate([-push, own], axis=-1)))
+                self._loaded.append(_Loaded(frame, body, point, wrench, np.concatenate([-push, own], axis=-1)))
                 if body >= 0:
                     wrenches[:, body] += wrench
                     wrenches[:, body, 3:] -= (wrench[:, None, :3] @ arm)[:, 0]
@@ -274,7 +270,7 @@ class LoadedTree:
     def _speed(self, one: _Loaded, twists: FloatArray) -> FloatArray:
         """Velocity and turn of a loaded frame, shape (N, L, 6)."""
         speed: FloatArray = twists[:, one.body].copy() if one.body >= 0 else np.zeros((len(twists), *twists.shape[2:]))
-        speed[..., :3] += speed[..., 3:] @ one.arm
+        speed[..., :3] += speed[..., 3:] @ self.frame(one.name)[3]
         return speed
 
 
@@ -294,7 +290,7 @@ def _placed(tree: Topology, joints: FloatArray) -> FloatArray:
     motion[..., 2] -= np.cos(q)
     own = (motion @ tree.motions).reshape(*q.shape, 4, 4)
     placed = np.zeros((len(q) + 1, q.shape[1], 4, 4))
-    placed[-1] = _HERE
+    placed[-1] = np.eye(4)
     for joint, before in enumerate(tree.parents):
         np.matmul(placed[before], own[joint], out=placed[joint])
     return placed.swapaxes(0, 1)
