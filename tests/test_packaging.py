@@ -101,7 +101,7 @@ ROOMS = {
     "dynamics": "core constant_curvature model environment statics",
     "identification": "core inflated_beam constant_curvature description robots model environment statics dynamics",
     "compiled": "core inflated_beam constant_curvature description model environment statics dynamics identification",
-    "learning": "core model environment statics identification compiled",
+    "learning": "core inflated_beam description model environment statics identification compiled",
     "jax": "core learning",
     "torch": "core learning",
     "export": "core inflated_beam constant_curvature description robots model environment statics dynamics",
