@@ -95,6 +95,8 @@ def test_what_jax_functions_refuse(jax: Any, equilibrium: Any) -> None:
         jax.hessian(lambda q: equilibrium(q, FORCES[0])[1].sum())(MOTORS[0])
     with pytest.raises(sr.ParameterError, match=r"shape \(\.\.\., 3\)"):
         equilibrium(np.zeros(4), FORCES)
+    with pytest.raises(sr.ParameterError, match="leading dimensions"):
+        jax.jit(equilibrium)(np.zeros((2, 3)), np.zeros((3, 3)))
     with pytest.raises(sr.ParameterError, match="finite motors and loads"):
         equilibrium(np.full(3, np.nan), FORCES[0])
     with pytest.raises(Exception, match=r"rows = \[0\]"):  # of a kind of JAX, which holds ours

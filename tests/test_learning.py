@@ -308,3 +308,31 @@ def check_random(
     backward = sum(float((np.nan_to_num(a) * b).sum()) for a, b in zip(map(np.asarray, pulled), rates, strict=True))
     assert np.nansum(np.concatenate(weights, axis=1) * slopes) == pytest.approx(backward, rel=1e-9)
     return int(good.sum())
+
+
+@pytest.mark.parametrize("lead", [((0,), (0,), ()), ((0,), (0,), (0,)), ((), (), (0,)), ((2, 0), (0,), (2, 0))])
+def test_an_empty_batch_has_empty_results_and_zero_gradients(lead: tuple[tuple[int, ...], ...]) -> None:
+    """Of compiled code and of robots that are solved one by one."""
+    for robot, name in ((sr.InflatableArm(), "stiffness"), (sr.PccArm(elastic_sections=1), "bending_stiffness")):
+        solver = Differentiable("equilibrium", robot, name, gravity=None, backend=None, threads=1, failed="raise")
+        inputs = [np.ones((*shape, size)) for shape, size in zip(lead, solver.inputs, strict=True)]
+        whole = np.broadcast_shapes(*lead)
+        results = solver.solve(*inputs)
+        assert [one.shape for one in results] == [(*whole, size) for size in solver.results]
+        assert [one.shape for one in solver.push(inputs, results, inputs)] == [one.shape for one in results]
+        pulled = solver.pull(inputs, results, results, [*lead[:2], None])
+        assert pulled[2] is None
+        assert [np.shape(one) for one in pulled[:2]] == [one.shape for one in inputs[:2]]
+        assert not any(np.any(one) for one in pulled[:2])
+
+
+def test_parameters_that_are_no_numbers_and_shapes_that_do_not_fit_are_refused() -> None:
+    """Also with failed="nan", and of offsets, which no robot looks at: those too large to compute with as well."""
+    for names in (("stiffness",), ("motor[1].offset",)):
+        solver = Differentiable("equilibrium", sr.InflatableArm(), names, gravity=None, **(OPTIONS | {"failed": "nan"}))
+        for bad in (np.nan, np.inf, 1e308):
+            for rows in ([bad], [[0.1], [bad]]):
+                with pytest.raises(sr.ParameterError):
+                    solver.solve(np.zeros((2, 3)), np.zeros(3), np.array(rows))
+        with pytest.raises(sr.ParameterError, match="leading dimensions"):
+            solver.solve(np.zeros((2, 3)), np.zeros((3, 3)), solver.present)

@@ -95,6 +95,8 @@ def test_what_torch_functions_refuse(equilibrium: Any) -> None:
         equilibrium(MOTORS.float(), FORCES)
     with pytest.raises(sr.ParameterError, match=r"shape \(\.\.\., 3\)"):
         equilibrium(torch.zeros(4, dtype=torch.float64), FORCES)
+    with pytest.raises(sr.ParameterError, match="leading dimensions"):
+        equilibrium(MOTORS[:2], torch.zeros((3, 3), dtype=torch.float64))
     one = MOTORS[0].clone().requires_grad_()
     (slope,) = torch.autograd.grad(equilibrium(one, FORCES[0])[1].sum(), one, create_graph=True)
     with pytest.raises(NotImplementedError, match="first derivatives only"):

@@ -42,8 +42,7 @@ def equilibrium(
     Returns:
         The function `f(q_motors, force, parameters) -> (q_springs, tip)`. Shapes are (..., n_motors) [rad or m], (..., 3) [N],
         (P,) or (..., P), (..., n_springs) [rad or m] and (..., 3) [m], world axes; leading dimensions are broadcast. Without
-        parameters they have their present values. `f.parameters` are their names, `f.values` those values. Every other row of
-        values of the parameters loads the robot once more.
+        parameters they have their present values. `f.parameters` are their names, `f.values` those values.
 
     Raises:
         ParameterError: If an argument is invalid, the robot has dry friction, or `backend` has no derivatives of it.

@@ -12,7 +12,7 @@ from jax.extend.core import Primitive
 from jax.interpreters import ad, batching, mlir
 
 from softrobots.core.errors import ParameterError
-from softrobots.learning.differentiable import Differentiable
+from softrobots.learning.differentiable import Differentiable, lead_of
 
 
 class Function:
@@ -33,6 +33,7 @@ class Function:
         for name, array, size in zip(("q_motors", "load", "parameters"), arrays, self._solver.inputs, strict=True):
             if array.ndim == 0 or array.shape[-1] != size:
                 raise ParameterError(name, array.shape, f"an array of shape (..., {size})")
+        lead_of(arrays)
         rank = max(array.ndim for array in arrays)
         arrays = [array.reshape((1,) * (rank - array.ndim) + array.shape) for array in arrays]
         if not any(isinstance(one, jax.core.Tracer) for one in arrays):  # errors are then our own

@@ -59,11 +59,8 @@ class Differentiable:
         if backend is not None:
             choice("backend", backend, (*BACKENDS, GENERAL))
         names = [parameters] if isinstance(parameters, str) else list(parameters)
-        self._set = (
-            ParameterSet.of(given, names)
-            if names
-            else ParameterSet(given if isinstance(given, SoftModel) else load_model(given), (), {})
-        )
+        model = given if isinstance(given, SoftModel) or names else load_model(given)
+        self._set = ParameterSet.of(given, names) if names else ParameterSet(model, (), {})
         for one in self._set.parameters:
             if one.place.kind not in (*OF_MODEL, "offset"):
                 requirement = "parameters of the robot or offsets of motors; actuators and loads are arguments of their own"
@@ -74,12 +71,11 @@ class Differentiable:
             check_feels(self.model)
             if self.model.n_motors < 3:
                 raise ParameterError(
-                    "robot", self.model.pinocchio.name, "a robot with three motors at least, which feel every force"
+                    "robot", self.model.pinocchio.name, "one with three motors at least, which feel every force"
                 )
         chosen = backend or (available_backend() if _is_unrolled(self.model) else GENERAL)
-        self._changes: NumberChanges | GeneralSolver
         if chosen != GENERAL:
-            self._changes = NumberChanges(self._set, chosen, weight=gravity is not None)
+            self._changes: NumberChanges | GeneralSolver = NumberChanges(self._set, chosen, weight=gravity is not None)
         else:
             compiled = robot if isinstance(robot, CompiledModel) and backend != GENERAL else None
             self._changes = GeneralSolver(self._set, weight=gravity is not None, compiled=compiled)
@@ -104,12 +100,17 @@ class Differentiable:
             The results, shapes (..., k); NaN in rows that failed, if that was asked for.
 
         Raises:
-            ParameterError: If a row is not finite or too large, or the robot refuses the parameters.
+            ParameterError: If a row is not finite or too large, a parameter is not finite, or the robot refuses them.
             EquilibriumNotFound: If rows have no stable equilibrium; names them.
             LoadNotFound: If no unique force explains the torques of rows.
         """
-        lead = _lead(inputs)
+        lead = lead_of(inputs)
         count = math.prod(lead)
+        if not count:
+            return tuple(np.zeros((*lead, size)) for size in self.results)
+        values = np.asarray(inputs[2], dtype=np.float64)
+        if not np.isfinite(values).all() or np.abs(values @ self._set.offset_slopes.T).max(initial=0.0) > LARGEST_POSITION:
+            raise ParameterError("parameters", values, "finite values, and offsets of motors that are not too large")
         motors, loads = (_flat(one, lead) for one in inputs[:2])
         bad = unusable(motors) | unusable(loads)
         if motors.size and not (motors.min() >= -LARGEST_POSITION and motors.max() <= LARGEST_POSITION):
@@ -122,10 +123,10 @@ class Differentiable:
             motors = without(motors, bad[: len(motors)], self.model.relaxed_motors)
             loads = without(loads, bad[: len(loads)])
         found = _Parts(count)
-        for rows, values in self._groups(inputs[2], lead):
-            code, numbers, _ = self._changes.code(values)
+        for rows, at in self._groups(values, lead):
+            code, numbers, _ = self._changes.code(at)
             solver = code.equilibria if self.kind == "equilibrium" else code.estimates
-            given = self._true(_picked(motors, rows), values), _picked(loads, rows)
+            given = self._true(_picked(motors, rows), at), _picked(loads, rows)
             found.put(rows, solver(*given, self._gravity, numbers, self._threads, len(np.arange(count)[rows])))
         *results, residuals, statuses = found.arrays
         failed = (statuses != Status.CERTIFIED) | bad
@@ -138,7 +139,9 @@ class Differentiable:
     def push(self, inputs: Sequence[Any], results: Sequence[Any], rates: Sequence[Any]) -> tuple[FloatArray, ...]:
         """Return the rates of the results from those of the inputs, None for zero; NaN in rows that failed."""
         given = [np.zeros(size) if rate is None else rate for size, rate in zip(self.inputs, rates, strict=True)]
-        lead = _lead([*inputs, *results, *given])
+        lead = lead_of([*inputs, *results, *given])
+        if not math.prod(lead):
+            return tuple(np.zeros((*lead, size)) for size in self.results)
         of_motors, of_load, of_parameters = (_flat(one, lead) for one in given)
         of_motors = of_motors + of_parameters @ self._set.offset_slopes.T
         found = _Parts(math.prod(lead), np.nan)
@@ -167,7 +170,9 @@ class Differentiable:
         Returns:
             The weights; None for those not needed. Rows that failed add nothing.
         """
-        lead = _lead([*inputs, *results, *weights])
+        lead = lead_of([*inputs, *results, *weights])
+        if not math.prod(lead):
+            return tuple(None if one is None else np.zeros((*one, k)) for one, k in zip(shapes, self.inputs, strict=True))
         given = [_flat(one, lead) for one in weights]
         each = () if shapes[2] is None else shapes[2]
         values_of = np.broadcast_to(inputs[2], (*np.broadcast_shapes(np.shape(inputs[2])[:-1], each), len(self.present)))
@@ -188,8 +193,7 @@ class Differentiable:
         )
 
     def _true(self, motors: FloatArray, values: tuple[float, ...]) -> FloatArray:
-        offsets = self._set.motor_offsets(np.array(values))
-        return motors + offsets if np.any(offsets) else motors
+        return motors + self._set.motor_offsets(np.array(values))
 
     def _cases(
         self, inputs: Sequence[Any], results: Sequence[Any], lead: tuple[int, ...], *, apart: bool = False, slopes: bool
@@ -236,9 +240,8 @@ class Differentiable:
         named = ", ".join(map(str, rows[:8].tolist())) + (", ..." if len(rows) > 8 else "")
         reasons = "; ".join(Status(int(one)).explanation for one in np.unique(statuses[rows]))
         error = EquilibriumNotFound if self.kind == "equilibrium" else LoadNotFound
-        residual = float(residuals[rows].max())
         message = f"{len(rows)} of {len(failed)} rows have no certified result (row {named}): {reasons}{_ADVICE}"
-        raise error(message, best=rows, residual=residual, iterations=0)
+        raise error(message, best=rows, residual=float(residuals[rows].max()), iterations=0)
 
 
 class _Parts:
@@ -267,9 +270,12 @@ def _is_unrolled(model: SoftModel) -> bool:
         return False
 
 
-def _lead(arrays: Sequence[Any]) -> tuple[int, ...]:
-    """Return the common leading dimensions of arrays."""
-    return np.broadcast_shapes(*(np.shape(one)[:-1] for one in arrays))
+def lead_of(arrays: Sequence[Any]) -> tuple[int, ...]:
+    """Return the common leading dimensions of arrays; refuse those that have none."""
+    try:
+        return np.broadcast_shapes(*(np.shape(one)[:-1] for one in arrays))
+    except ValueError:
+        raise ParameterError("shapes", [np.shape(one) for one in arrays], "those whose leading dimensions fit") from None
 
 
 def _flat(array: Any, lead: tuple[int, ...]) -> FloatArray:

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 import softrobots as sr
+from softrobots.identification.parameters import ParameterSet
 from softrobots.learning.differentiable import Differentiable
 from studies.benchmark.arm_baselines import CHECKED, batch_name, compiled_batch, expected_springs
 from studies.benchmark.cases import LoadCases, standard_cases
@@ -17,6 +18,8 @@ from studies.benchmark.results import AT_MOST
 
 PARAMETERS = ("link[*].stiffness", "hinge_offset", "link[*].wall_thickness", "motor[*].offset")
 _PLAIN, _VALUES, _GRADIENT = batch_name("numba"), "numbers of the robot as inputs", "gradient"
+_OWN_VALUES, _OWN_BOTH = "values, parameters of each case", "values and gradient, parameters of each case"
+_ROWS = 256  # cases with parameters of their own
 _JAX_VALUES, _JAX_BOTH = "JAX, values", "JAX, values and gradient"
 
 
@@ -27,6 +30,8 @@ def gradients(settings: Settings) -> Outcome:
     comparison.add(_PLAIN, partial(compiled_batch, _PLAIN, "numba", cases, expected_springs(cases, None), None))
     comparison.add(_VALUES, partial(_values, cases))
     comparison.add(_GRADIENT, partial(_gradient, cases))
+    comparison.add(_OWN_VALUES, partial(_of_each_case, cases, gradient=False))
+    comparison.add(_OWN_BOTH, partial(_of_each_case, cases, gradient=True))
     comparison.add(_JAX_VALUES, partial(_by_jax, cases, gradient=False))
     comparison.add(_JAX_BOTH, partial(_by_jax, cases, gradient=True))
     comparison.run()
@@ -34,6 +39,7 @@ def gradients(settings: Settings) -> Outcome:
     rows = [
         comparison.costlier(job, _VALUES, _PLAIN),
         comparison.costlier(job, _GRADIENT, _PLAIN, AT_MOST, 2.0),
+        comparison.costlier(job, _OWN_BOTH, _OWN_VALUES, AT_MOST, 3.0),
         comparison.costlier(job, _JAX_BOTH, _JAX_VALUES),
     ]
     return Outcome(rows)
@@ -66,6 +72,27 @@ def _gradient(cases: LoadCases) -> Workload:
     require_agreement(_GRADIENT, np.asarray(by_motors)[: len(found)], motors, 1e-7, "m/rad")
     require_agreement(_GRADIENT, np.asarray(by_force)[: len(found)], force, 1e-7, "m/N")
     return Workload(count, lambda: solver.pull(inputs, results, weights, shapes))
+
+
+def _of_each_case(cases: LoadCases, *, gradient: bool) -> Workload:
+    """At values of the parameters that no run before has seen; the first ones are compared with those of loaded robots."""
+    solver, random, some = _solver(), np.random.default_rng(0), cases.first(_ROWS)
+    count, parameters = len(some.forces), ParameterSet.of(sr.InflatableArm(), PARAMETERS)
+
+    def run() -> Any:
+        values = solver.present + 0.01 * random.uniform(-1.0, 1.0, (count, len(solver.present))) * (solver.present + 0.01)
+        results = solver.solve(*some, values)
+        if gradient:
+            weights = [np.zeros_like(results[0]), np.tile([0.0, 0.0, 1.0], (count, 1))]
+            solver.pull([*some, values], results, weights, [(count,)] * 3)
+        return values, results
+
+    values, results = run()
+    for row in range(min(3, count)):
+        motors = some.q_motors[row] + parameters.motor_offsets(values[row])
+        found = sr.solve_equilibrium(parameters.model(values[row]), motors, some.forces[row], tolerance=1e-13)
+        require_agreement(_OWN_VALUES, results[0][row], found.q_springs, 1e-8, "rad")
+    return Workload(count, run)
 
 
 def _by_jax(cases: LoadCases, *, gradient: bool) -> Workload:
