@@ -13,7 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -55,7 +55,7 @@ class ModelChange:
 
     `placements` and `frames` change by twists of six rows each, in the joint before: linear part at its origin, then angular.
     """
-    _stacked: dict[tuple[str, ...], tuple[list[int], FloatArray]] = field(default_factory=dict, init=False, repr=False)
+    _stacked: dict[tuple[str, ...], FloatArray] = field(default_factory=dict, init=False, repr=False)
 
     @classmethod
     def of(cls, size: int, base: Numbers, slopes: Iterable[tuple[int, str, FloatArray]]) -> ModelChange:
@@ -67,25 +67,12 @@ class ModelChange:
         return cls(size, columns)
 
     def along(self, rows: Mapping[str, FloatArray]) -> FloatArray:
-        """Return the change of rows of outputs, shape (N, L, P), from their derivatives by some numbers, shapes (N, L, ...).
-
-        Those by placements are those of the joints `moved` alone.
-        """
-        names = tuple(name for name in rows if name in self.by_number)
+        """Return the change of rows of outputs, shape (N, L, P), from their derivatives by some numbers, shapes (N, L, ...)."""
+        names, shape = tuple(name for name in rows if name in self.by_number), next(iter(rows.values())).shape[:2]
         if names not in self._stacked:
-            flat = [self.moved[1] if name == "placements" else self.by_number[name] for name in names]
-            self._stacked[names] = [len(one) for one in flat], np.concatenate(flat)
-        sizes, stacked = self._stacked[names]
-        shape = rows[names[0]].shape[:2]
-        each = [rows[name].reshape(*shape, size) for name, size in zip(names, sizes, strict=True)]
-        return np.asarray(np.concatenate(each, axis=-1).reshape(-1, len(stacked)) @ stacked).reshape(*shape, self.n_parameters)
-
-    @cached_property
-    def moved(self) -> tuple[Any, FloatArray]:
-        """The joints whose placements change, k of them, and their rows of `placements`, shape (6 k, P)."""
-        twists = self.by_number["placements"].reshape(-1, 6, self.n_parameters)
-        joints = np.flatnonzero(np.any(twists, axis=(1, 2)))
-        return joints, twists[joints].reshape(-1, self.n_parameters)
+            self._stacked[names] = np.concatenate([self.by_number[name] for name in names])
+        each = np.concatenate([rows[name].reshape(*shape, len(self.by_number[name])) for name in names], axis=-1)
+        return np.asarray(each.reshape(-1, each.shape[2]) @ self._stacked[names]).reshape(*shape, self.n_parameters)
 
 
 def model_change(

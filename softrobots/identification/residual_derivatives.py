@@ -264,7 +264,7 @@ class AdjointRows:
         if changed & _OF_SPRINGS:
             found |= at.springs.slopes(self.virtual)
         if "placements" in changed:
-            found["placements"] = np.swapaxes(at.tree.at_placements(self._motion[1], change.moved[0]), 1, 2)
+            found["placements"] = np.swapaxes(at.tree.at_placements(self._motion[1]), 1, 2)
         total = change.along(found) if found else np.zeros((*self.virtual.shape[:2], change.n_parameters))
         if "frames" in changed:
             frames, by_frame = (

@@ -24,7 +24,7 @@ from softrobots.identification.parameters import ParameterSet
 from softrobots.inflated_beam import moment_limits
 from softrobots.model.serial_chain import ChainJoint, SerialChain
 
-OF_SPRING = ("stiffness", "rest")
+_OF_SPRING = ("stiffness", "rest")
 Read = Callable[[str], FloatArray]
 """Returns words of a description as columns, shape (N or 1, words)."""
 
@@ -37,10 +37,10 @@ def descriptions(parameters: ParameterSet, rows: FloatArray) -> Iterator[tuple[A
     """
     present, roles = parameters.present, parameters.present.joint_roles
     given = {name: pair for name, pair in present.spring_table.items() if roles[name] == "given spring"}
-    springs = {name: dict(zip(OF_SPRING, map(repr, pair), strict=True)) for name, pair in given.items()}
+    springs = {name: dict(zip(_OF_SPRING, map(repr, pair), strict=True)) for name, pair in given.items()}
     for place, one in parameters.places("spring"):
         for name in one.place.names:
-            springs.setdefault(name, {})[OF_SPRING[one.place.parts[0]]] = f"\ue000{place}\ue002"
+            springs.setdefault(name, {})[_OF_SPRING[one.place.parts[0]]] = f"\ue000{place}\ue002"
     inside = np.all((rows >= parameters.lower) & (rows <= parameters.upper) & ((rows > 0.0) | ~parameters.logarithmic), axis=1)
     own = [tape for tape in (Tape(()),) if tape.keep(present.urdf)]
     for tape in tuple(parameters.variants.expansions.tapes) if parameters.entries else own:
@@ -97,7 +97,7 @@ def chain_columns(root: ElementTree.Element, chain: SerialChain, tip: str, read:
     strains = {one.name: one.strain for one in elements if one.strain is not None}
     for joint in root.findall("joint"):
         for spring in joint.findall("{*}spring") if joint.get("name") in strains else ():
-            springs[strains[joint.get("name")]] = [read(spring.get(name, "0")) for name in OF_SPRING]
+            springs[strains[joint.get("name")]] = [read(spring.get(name, "0")) for name in _OF_SPRING]
     names = {strain: name for name, strain in strains.items()}
     slack = [largest_linear_moment(root, names[inner], read) for inner, _, _ in chain.slack_hinges]
     row, _, translation = placed(tip)

@@ -19,9 +19,9 @@ import numpy as np
 from softrobots.core.checks import FloatArray
 from softrobots.core.errors import SoftRobotsError
 from softrobots.description.urdf_tags import SpringTag
-from softrobots.identification.model_change import ModelChange, neighbours, numbers_of, scales_of
+from softrobots.identification.model_change import ModelChange, model_change, neighbours, numbers_of, scales_of
 from softrobots.identification.parameters import ParameterSet
-from softrobots.learning.recorded_chains import OF_SPRING, Read, descriptions, largest_linear_moment, tree_columns
+from softrobots.learning.recorded_chains import Read, descriptions, largest_linear_moment, tree_columns
 from softrobots.model.assembly import elastic_parts
 from softrobots.model.muscle_lengths import MuscleLengths
 from softrobots.model.muscle_paths import MusclePaths
@@ -48,29 +48,17 @@ class RecordedModels:
             return given.model(given.values + np.where(given.values + step < given.upper, step, -step))
         return None
 
-    @cached_property
-    def _of_springs(self) -> ModelChange:
-        """The change by joint springs alone, which are themselves numbers of the robot."""
-        given, joints = self._parameters, self._parameters.present.structure.spring_joints
-        slopes = np.zeros((2, len(given.present.structure.strain_springs.names), len(given.names)))
-        for place, one in given.places("spring"):
-            slopes[one.place.parts[0], [joints.index(name) for name in one.place.names], place] = 1.0
-        return ModelChange(len(given.names), dict(zip(OF_SPRING, slopes, strict=True)))
-
     def changes(self, each: Sequence[tuple[float, ...]], models: Sequence[SoftModel]) -> dict[tuple[float, ...], ModelChange]:
         """Return `model_change` at values of the parameters, of the robots with them; not of those that no tape tells."""
         given, found, rows = self._parameters, dict[tuple[float, ...], ModelChange](), np.array(each)
-        if not given.entries and not given.present.muscles:
-            return dict.fromkeys(each, self._of_springs)
+        if not given.entries and not given.present.muscles:  # joint springs are numbers themselves
+            return dict.fromkeys(each, model_change(given))
         if self._like is None:
             return found
         moved, weights = neighbours(given, rows)
         for same, root, read in descriptions(given, np.concatenate(moved)):
-            own = [
-                row
-                for row, follows in enumerate(same.reshape(len(moved), -1).all(axis=0))
-                if follows and each[row] not in found
-            ]
+            follow = np.flatnonzero(same.reshape(len(moved), -1).all(axis=0)).tolist()
+            own = [row for row in follow if each[row] not in found]
             if not own:
                 continue
             numbers_at = _numbers_like(self._like, root, read, len(same))

@@ -87,8 +87,6 @@ class _Loaded(NamedTuple):
     """Its position, shape (N, 3) [m]."""
     wrench: FloatArray
     """Force on it, then moment, shape (N, 6) [N, N m]."""
-    turning: FloatArray
-    """Takes the turn of the joint, a row, to what its work makes of a twist of the frame, shape (N, 3, 6)."""
 
 
 class LoadedTree:
@@ -129,13 +127,11 @@ class LoadedTree:
         for frame, wrench in loads.items():
             if frame:
                 body, _, point, arm = self.frame(frame)
-                push = skew(wrench[:, :3])
-                own = push @ arm
-                self._loaded.append(_Loaded(frame, body, point, wrench, np.concatenate([-push, own], axis=-1)))
+                self._loaded.append(_Loaded(frame, body, point, wrench))
                 if body >= 0:
                     wrenches[:, body] += wrench
                     wrenches[:, body, 3:] -= (wrench[:, None, :3] @ arm)[:, 0]
-                    turned[:, body] += own
+                    turned[:, body] += skew(wrench[:, :3]) @ arm
         carried = skew(wrenches.reshape(*wrenches.shape[:2], 2, 3))
         carried[:, :, 1] += turned
         self._carried, self._beyond = carried.reshape(*wrenches.shape, 3), tree.beyond @ wrenches
@@ -252,16 +248,17 @@ class LoadedTree:
         found = {}
         for one in self._loaded:
             if one.body >= 0:
-                found[one.name] = self._in_joint(one.body, twists[:, one.body, :, 3:] @ one.turning)
+                force = -twists[:, one.body, :, 3:] @ skew(one.wrench[:, :3])
+                found[one.name] = self._in_joint(one.body, np.concatenate([force, -force @ self.frame(one.name)[3]], axis=-1))
         return found
 
     def at_joints(self, by_twist: FloatArray) -> FloatArray:
         """Derivatives by joint positions from those by twists, shape (N, L, n)."""
         return np.swapaxes((by_twist @ self.axes[..., None])[..., 0], 1, 2)
 
-    def at_placements(self, by_twist: FloatArray, joints: Any) -> FloatArray:
-        """Derivatives by twists of the placements of k joints in the frames before them, shape (N, k, L, 6), from the same."""
-        return self._in_joint(self.topology.parents.take(joints), by_twist.take(joints, 1))
+    def at_placements(self, by_twist: FloatArray) -> FloatArray:
+        """Derivatives by twists of the placements of joints in the frames before them, shape (N, n, L, 6), from the same."""
+        return self._in_joint(self.topology.parents, by_twist)
 
     def _in_joint(self, joints: Any, wrenches: FloatArray) -> FloatArray:
         """Wrenches at the origin, shape (N, ..., L, 6), seen from joints, shape (...)."""
