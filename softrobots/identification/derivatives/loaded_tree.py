@@ -134,7 +134,7 @@ class LoadedTree:
                     turned[:, body] += skew(wrench[:, :3]) @ arm
         carried = skew(wrenches.reshape(*wrenches.shape[:2], 2, 3))
         carried[:, :, 1] += turned
-        self._carried, self._beyond = carried.reshape(*wrenches.shape, 3), tree.beyond @ wrenches
+        self._turned, self._carried, self._beyond = turned, carried.reshape(*wrenches.shape, 3), tree.beyond @ wrenches
 
     @property
     def torque(self) -> FloatArray:
