@@ -113,8 +113,7 @@ class LoadedTree:
         self._to_world[..., :3, 3:] = skew(self.position) @ self.rotation
         self.axes = (self._to_world[:, :-1] @ tree.axes[..., None])[..., 0]
         """World twist of each joint, at the origin, shape (N, n, 6)."""
-        wrenches: FloatArray = np.zeros(self.axes.shape)
-        turned: FloatArray = np.zeros((*self.axes.shape[:2], 3, 3))
+        wrenches, turned = np.zeros(self.axes.shape), np.zeros((*self.axes.shape[:2], 3, 3))
         gravity, self._weight = loads.get(""), None
         if gravity is not None:
             bodies, pull = numbers["masses"].take(_FIRST_THEN_MASS, -1)[..., None], skew(gravity)[:, None]
