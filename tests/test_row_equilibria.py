@@ -10,6 +10,7 @@ from softrobots.identification import row_equilibria
 from softrobots.identification.derivatives.rows_and_states import States
 from softrobots.identification.row_equilibria import balanced_course, balanced_rows
 from softrobots.model.friction_coordinates import memory_of
+from softrobots.statics.elastostatics import LARGEST_STEP
 from tests.support.law_robots import PUSHES, ROBOTS, model
 
 GRAVITY = np.array(sr.EARTH_GRAVITY)
@@ -49,6 +50,19 @@ def test_rows_are_the_equilibria_of_each(kind: str) -> None:
             states.coupling[row], one.coupling, rtol=1e-8, atol=1e-8 * np.abs(one.coupling).max(initial=1.0)
         )
         np.testing.assert_allclose(states.actuator_loads[row], one.motor_torques, rtol=1e-8, atol=1e-8)
+
+
+def test_rows_far_from_where_they_start_are_found_from_rest() -> None:
+    """Tendons pulled by up to 5 mm bend an arm by more than one step may go; few rows are left to a search of their own."""
+    arm, random, n = sr.load_model(sr.TendonArm(elastic_sections=1)), np.random.default_rng(2), 40
+    motors = arm.relaxed_motors - random.uniform(-2e-3, 5e-3, (n, arm.n_motors))
+    states = States.at(arm, motors, np.tile(arm.rest, (n, 1)), {})
+    found = balanced_rows(arm, states, 1e-12)
+    assert np.mean(found) > 0.9
+    assert np.median(np.linalg.norm(states.q_springs - arm.rest, axis=1)) > LARGEST_STEP
+    for row in np.flatnonzero(found):
+        one = sr.solve_equilibrium(arm, motors[row], tolerance=1e-12)
+        np.testing.assert_allclose(states.q_springs[row], one.q_springs, rtol=0, atol=1e-9)
 
 
 def test_an_unstable_equilibrium_is_left() -> None:

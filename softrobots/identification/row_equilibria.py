@@ -1,7 +1,7 @@
 r"""Equilibria of many rows at once, by Newton's method from starts that are near.
 
 A row whose residual `r` each step does not halve at least, or that does not end in a stable equilibrium, is left to the search
-for a single one.
+for a single one. Steps from afar are shortened, as there, and go on where the tangent stiffness is positive definite.
 
 Rows that follow one another with dry friction are solved together. With the bending `b` of a section, its slider `c` before
 the row and the moment of friction :math:`\tau` within the disc of the limit `L` (`softrobots.model.dry_friction`; `s` is the
@@ -34,7 +34,7 @@ from softrobots.statics.elastic_state import MOMENT_FLOOR
 from softrobots.statics.elastostatics import CLEARLY, LARGEST_STEP, balanced_state
 
 _MOST = 48  # elastic coordinates; beyond, a search for each row is as fast
-_MOST_STEPS = 8
+_MOST_STEPS = 12
 _SHRINKS = 0.5  # share of the residual that a step leaves at most
 _MOST_TOGETHER = 60  # steps of rows that follow one another
 _FEWER = 0.9  # share of the rows that is left by a step that gains
@@ -67,11 +67,13 @@ def balanced_rows(model: SoftModel, whole: States, tolerance: float) -> Any:
             steps = np.linalg.solve(states.tangent, -residual[..., None])[..., 0]
         except np.linalg.LinAlgError:
             break
-        goes_on = ~done & (size <= _SHRINKS * last) & (np.linalg.norm(steps, axis=1) <= LARGEST_STEP)
-        rows, last = rows[goes_on], size[goes_on]
+        shorter = np.minimum(1.0, LARGEST_STEP / np.maximum(np.linalg.norm(steps, axis=1), 1e-300))
+        goes_on, cut = ~done & (size <= last), np.flatnonzero(shorter < 1.0)
+        goes_on[cut] &= _is_stable(model, states.tangent[cut])
+        rows, last = rows[goes_on], (size * np.where(shorter < 1.0, 1.0, _SHRINKS))[goes_on]
         if not len(rows):
             break
-        whole.q_springs[rows] += steps[goes_on]
+        whole.q_springs[rows] += (steps * shorter[:, None])[goes_on]
     return found
 
 
