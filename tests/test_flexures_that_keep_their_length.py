@@ -158,7 +158,7 @@ def test_sensitivities_are_differences_of_equilibria() -> None:
 
 def test_text_and_result_files_bring_them_back(tmp_path: Path) -> None:
     again = sr.load_model(KEPT.urdf)
-    assert again.spring_joints == KEPT.spring_joints
+    assert again.spring_joints == KEPT.spring_joints == sr.load_model(KEPT.urdf.replace('"inf"', '" INF"')).spring_joints
     found = sr.solve_equilibrium(again, (), FORCE, gravity=GRAVITY)
     sr.save_result(found, tmp_path / "found.npz")
     np.testing.assert_array_equal(sr.load_result(tmp_path / "found.npz").q_springs, found.q_springs)
@@ -168,6 +168,7 @@ def test_what_needs_stretch_is_refused() -> None:
     text = KEPT.urdf
     for changed, words in (
         (text.replace('EA="inf"', 'EA="2000.0"', 1), "EA inf of all sections"),
+        (text.replace('EA="inf"', 'EA="-inf"', 1), "EA = '-inf'; a finite number"),
         (text.replace('rest="0.0 0.0 0.0 1.0"', 'rest="0.0 0.0 0.0 1.1"', 1), "the stretches 1.1, 1.0; required: 1"),
         (text.replace(' 1.0" rest', ' 0.9" rest', 1), "the stretches 1.0, 0.9; required: 1"),
         (

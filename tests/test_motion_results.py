@@ -66,6 +66,7 @@ def test_motions_that_are_none_are_refused(released: sr.Motion, tmp_path: Path) 
         ({"velocities": np.full((n, 4), np.nan)}, "velocities"),
         ({"kinetic": released.energy.kinetic[:-1]}, "kinetic"),
         ({"tip_error": np.array(np.inf)}, "tip_error"),
+        ({"mass_damping": np.array(-1.0)}, "mass_damping must be zero or positive"),
         ({"interrupted": np.array(1)}, "interrupted"),
         ({"forces": np.zeros((n, 2))}, "forces"),
         ({"steps": np.array([0.0, 0.0])}, "steps must be increasing"),

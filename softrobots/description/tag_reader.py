@@ -142,7 +142,7 @@ def _section(element: ElementTree.Element, source: str, roles: Mapping[str, str]
             f"{where} names the joints {' '.join(joints) or '(none)'}; six joints with the role 'section' are required"
         )
     ei, gj = (positive(element, key, where) for key in ("EI", "GJ"))
-    ea = math.inf if element.get("EA") == "inf" else positive(element, "EA", where)
+    ea = math.inf if element.get("EA", "").strip().lower() == "inf" else positive(element, "EA", where)
     facts = _facts_of_section(element, where)
     relaxed = _strains(element, "relaxed", where) if "relaxed" in element.attrib else facts["rest"]
     facts["bends"] = positive(element, "bends", where) if "bends" in element.attrib else facts["length"]

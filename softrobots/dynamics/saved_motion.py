@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from softrobots.core.checks import FloatArray, finite_array, finite_number, increasing, read_only
+from softrobots.core.checks import FloatArray, finite_array, increasing, non_negative_number, read_only
 from softrobots.core.errors import FileFormatError
 from softrobots.core.result_file import KINDS, Kind, named_columns, text, vector_columns
 from softrobots.dynamics.linear_model import LinearModel, linearize
@@ -58,7 +58,7 @@ def _unpack(fields: Mapping[str, Any]) -> Motion:
     for motors, springs in zip(columns["q_motors"], columns["q_springs"], strict=True):
         if not model.coordinates.at(motors, springs).valid:
             raise FileFormatError("a section is out of its range")
-    numbers: dict[str, Any] = {name: finite_number(name, fields[name]) if name in fields else None for name in _NUMBERS}
+    numbers: dict[str, Any] = {name: non_negative_number(name, fields[name]) if name in fields else None for name in _NUMBERS}
     steps = finite_array("steps", fields["steps"], (None,), "s")
     return Motion(
         model=with_memories(fields, model, 1)[0],

@@ -49,7 +49,7 @@ def stopped_at(time: float, duration: float, error: Exception) -> str:
 
 
 def follow(recorder: Recorder, grid: FloatArray, *, to_knees: bool = False) -> Iterator[int]:
-    """Step through a grid of times, on demand to the knees of springs, too; yield once for each row. What fails is halved.
+    """Step through a grid of times, on demand to knees of springs, too; yield a row. What fails begins anew, then is halved.
 
     Raises:
         NoStep: If no step succeeds.

@@ -55,7 +55,7 @@ def check_linear(model: Any) -> SoftModel:
     if checked.structure.constant_strain:
         requirement = (
             'a chain of joint springs, chain="lumped" (pcc_arm_lumped, tendon_arm_lumped, ...): the six joints of a section of '
-            "constant strain follow four coordinates by a nonlinear map, which simulators cannot represent"
+            "constant strain follow its coordinates by a nonlinear map, which simulators cannot represent"
         )
         raise ParameterError("model", checked.pinocchio.name, requirement)
     if not checked.springs.linear:

@@ -56,8 +56,8 @@ _CONVENTIONS = {
     "the moment is stiffness |s| up to M1, and M1 (u - sin u cos u) / D beyond, with the u in (0, pi) of D = sin u - u cos u = "
     "pi M1 / (stiffness |s|)",
     "sections": "the six joints of a section of constant strain follow four coordinates (bending about x and y, twist, "
-    "elongation) with the stiffness EI / length, EI / length, GJ / length, EA / length; rest: strains kx, ky, twist, stretch "
-    "where all joints are at zero",
+    "elongation, which is zero without EA) with the stiffness EI / length, EI / length, GJ / length, EA / length; rest: "
+    "strains kx, ky, twist, stretch where all joints are at zero",
     "lumped_sections": "spring joints that stand for a section, by coordinate; hinge: length of rod from its start to them",
     "muscles": "actuators; route: offsets from the backbone, distance (cos(azimuth), sin(azimuth)), at places along the rest"
     " length of segments, linear between; kind: what is given of it, length, tension, elastic (length of its motor: tension "

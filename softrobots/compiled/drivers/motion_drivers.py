@@ -58,8 +58,8 @@ def motion_step(w: Array) -> int:
     """Move the robot by one step of time: POSITION and VELOCITY become those at its end.
 
     MOTORS_BEGIN, MOTORS_MIDDLE and MOTORS_END are the motors at its beginning,
-    in its middle and at its end; FORCE acts in its middle. A step whose
-    corrections do not converge is halved, and again. Returns the status.
+    in its middle and at its end; FORCE acts in its middle. A step whose corrections do
+    not converge begins anew without a guess, then halved, and again. Returns the status.
     """
     whole = w[TIME_STEP]
     w[WHOLE_STEP] = whole

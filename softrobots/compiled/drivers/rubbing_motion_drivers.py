@@ -81,13 +81,13 @@ def settle_middle(w: Array) -> bool:
         w[CHANGE] = 0.0
         move_along(w, 1.0)
         change = w[CHANGE]
-        if change <= MOTION_TOLERANCE or (change >= 0.5 * last and last <= MOTION_LEFT):
+        if change <= MOTION_TOLERANCE or (change >= 0.5 * last and last <= MOTION_ROUNDING):
             return True
         if change >= 1e300 or change > 1e3 * last:
             return False
         last = change
         left = search_back(w, first, left)
-    return False
+    return last <= MOTION_LEFT
 
 
 def finish_step(w: Array) -> None:

@@ -37,7 +37,7 @@ _CHECKS = """\
 #endif"""
 
 _APART = """\
-/* Both rounds of such a loop have places of their own: none reads what the other one writes. */
+/* Rounds of such a loop have places of their own: none reads what another one writes. */
 #if defined(__GNUC__) && !defined(__clang__)
 #define ROUNDS_APART _Pragma("GCC ivdep")
 #else
