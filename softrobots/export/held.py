@@ -8,8 +8,7 @@ stiffness :math:`\kappa = \sum t d^2 / h`, so that it changes the reference and 
           = \tfrac12 (k + \kappa) \Bigl(z - \frac{k r - A^T t}{k + \kappa}\Bigr)^2 + \text{constant}
 
 so a lumped chain under tensions is exactly a chain of springs. All else is refused: actuators of given length, tensions that
-follow the length, and winding routes couple the joints of a segment, and the six joints of a section of constant strain follow
-four coordinates; none is a joint spring.
+follow the length, and winding routes couple the joints of a segment, and a section of constant strain couples its six.
 """
 
 from __future__ import annotations
