@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,9 @@ from scipy.spatial.transform import Rotation
 import softrobots as sr
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
+from softrobots.identification.suspicions import hints
 from softrobots.statics import elastostatics
+from softrobots.view.identification_page import IdentificationPage
 
 ARM = {"segment_lengths": (0.06, 0.05), "elastic_sections": 1, "bending_friction": (2e-3, 1e-3)}
 
@@ -109,6 +112,44 @@ def test_friction_is_fitted_to_rows_in_order(rng: np.random.Generator) -> None:
     assert fit.validation is not None
     assert fit.validation.residuals["positions.tip"].shape == (10, 3)
     assert np.abs(fit.validation.residuals["positions.tip"]).max() < 2e-5
+
+
+def test_rows_kept_aside_are_shown_where_they_stand_and_masked_ones_arouse_no_suspicion(
+    rng: np.random.Generator, tmp_path: Path
+) -> None:
+    """All rows happen, one after the other; a position that is masked is a metre off."""
+    arm, measured = wandering(rng, 30)
+    tips, mask = np.array(measured.measured["positions.tip"]), np.arange(30) != 4
+    tips[~mask] += 1.0
+    rows = sr.Measurements(**measured.arguments() | {"tip_position": tips, "positions": None, "mask": mask})
+    fit = sr.identify(arm, rows, "segment[2].bending_stiffness", validation="path 1", max_iterations=3)
+    assert hints(fit) == []
+    robot, now = fit.model, None
+    assert fit.validation is not None
+    for row, pull in enumerate(rows.q_motors[:20]):
+        now = sr.solve_equilibrium(robot, robot.relaxed_motors - pull, previous=now, tolerance=1e-12)
+        if row >= 10:  # the rounding of the moments of friction over the softest direction
+            assert np.abs(fit.validation.states.q_springs[row - 10] - now.q_springs).max() < 1e-8
+    sr.save_result(fit, tmp_path / "fit.npz")
+    with pytest.raises(sr.ParameterError, match=r"aside.*came before"):
+        IdentificationPage(sr.load_result(tmp_path / "fit.npz"), aside=True)
+
+
+def test_rows_without_an_equilibrium_are_told_and_the_others_follow_one_another(rng: np.random.Generator) -> None:
+    """Tendons on both sides are pulled in by half the length of the arm; what comes after comes from the last row before."""
+    arm, measured = wandering(rng, 6)
+    model, pulls = sr.load_model(arm), np.array(measured.q_motors)
+    pulls[3] = np.resize([0.05, -0.05], model.n_motors)
+    rows = sr.Measurements(**measured.arguments() | {"q_motors": pulls})
+    with pytest.raises(sr.ParameterError, match=r"not row 3\): start from others, or leave these out;"):
+        sr.identify(arm, rows, "axial_stiffness")
+    fit = sr.identify(arm, measured, "axial_stiffness", validation=rows, max_iterations=1)
+    assert fit.validation is not None
+    assert fit.validation.lost == [3]
+    np.testing.assert_array_equal(fit.validation.states.q_springs[3], fit.model.rest)
+    others = np.delete(np.arange(6), 3)
+    one = Predictor(ParameterSet.of(fit.model, "base.position", {}), measured[others]).at(np.zeros(3))
+    np.testing.assert_allclose(fit.validation.states.q_springs[others], one.at.strains, rtol=0.0, atol=1e-8)
 
 
 @pytest.mark.study

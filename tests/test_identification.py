@@ -520,7 +520,7 @@ def test_a_fit_that_starts_at_the_truth_has_no_outliers() -> None:
 def test_rows_without_an_equilibrium_are_named() -> None:
     arm = sr.InflatableArm(stiffness=170.0, max_moment=10.0)
     data = sr.Measurements(np.zeros((3, 3)), wrench=[[0.0] * 6, [0, 0, 0, 0, 90.0, 0], [0.0] * 6], tip_position=np.ones((3, 3)))
-    with pytest.raises(sr.ParameterError, match=r"row 1 have none.*mask"):
+    with pytest.raises(sr.ParameterError, match=r"not row 1.*mask"):
         sr.identify(arm, data, "stiffness")
 
 

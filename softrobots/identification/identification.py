@@ -36,7 +36,7 @@ class Comparison(NamedTuple):
     """Measured minus predicted by quantity, shape (n, k), of poses position and rotation vector (n, 6); NaN where missing or
     not counted."""
     states: States | None = None
-    """The equilibria of the rows; None of a file, and where others than these rows were rolled out."""
+    """The equilibria of the rows; None of a file."""
 
     @property
     def n_counted(self) -> int:
@@ -230,10 +230,9 @@ def identification_of(fit: Fit, aside: Any) -> Identification:
             seen.values[predicting.lost] = seen.difference[predicting.lost] = np.nan
         validation = _comparison(aside, others, {key: np.ones(one.shape, bool) for key, one in others.differences().items()})
     elif aside is not None:
-        rows_aside = {key: np.repeat(aside[:, None], one.shape[1], axis=1) for key, one in prediction.differences().items()}
-        whole = _comparison(predictor.measurements, prediction, rows_aside)
-        parts = [{key: one[aside] for key, one in part.items()} for part in (whole.predicted, whole.residuals)]
-        validation = Comparison(whole.measurements[aside], parts[0], parts[1])
+        residuals_aside = {key: one[aside] for key, one in prediction.differences().items()}
+        predicted = {key: seen.values[aside] for key, seen in prediction.seen.items()}
+        validation = Comparison(predictor.measurements[aside], predicted, residuals_aside, prediction.at.states.rows(aside))
     return Identification(
         model=prediction.model,
         parameters=parameters.parameters,

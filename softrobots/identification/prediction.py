@@ -229,10 +229,14 @@ class Predictor:
             self.lost = searched_rows(model, states, rest, starts, _TOLERANCE)
         if self.lost and not self.gaps:
             more = f" and {len(self.lost) - 10} more" if len(self.lost) > 10 else ""
-            words = ", ".join(map(measurements.where, self.lost[:10])) + more + " have none"
-            requirement = f"rows with an equilibrium at the values to start from; {words}: start from others, or leave them out"
-            requirement += " by the mask; are order, signs and units of actuators and loads right?"
+            words = ", ".join(map(measurements.where, self.lost[:10])) + more
+            requirement = (
+                f"rows with an equilibrium at the starting values (not {words}): start from others, or leave these out"
+            )
+            requirement += "" if self.in_order else " by the mask"
+            requirement += "; are order, signs and units of actuators and loads right?"
             raise ParameterError("measurements", measurements, requirement)
+        states.q_springs[self.lost] = model.rest
         self._springs, self._sliders = states.q_springs, sliders
         return states, sliders
 

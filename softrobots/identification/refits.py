@@ -54,7 +54,7 @@ _TOLD_APART = 1e-3  # singular value, relative, of a combination of parameters i
 _OFF = math.log(2.0)  # change of a stiffness, as a logarithm, above which loads are doubted
 
 
-def other_axes(found: Identification, key: str, few: slice, progress: bool | str) -> list[str]:
+def other_axes(found: Identification, key: str, few: Any, progress: bool | str) -> list[str]:
     """The swap of two axes, or the mirrored axis, of positions with which a fit with a free base leaves far less."""
     if not key.startswith("positions.") or not any(name.startswith("base.rotation") for name in found.names):
         return []
@@ -70,7 +70,7 @@ def other_axes(found: Identification, key: str, few: slice, progress: bool | str
     ]
 
 
-def other_loads(found: Identification, key: str, few: slice, progress: bool | str) -> list[str]:
+def other_loads(found: Identification, key: str, few: Any, progress: bool | str) -> list[str]:
     """The sign of gravity, or sign or unit of the other loads, with which a fit leaves far less."""
     given = found.fitted.measurements[few].arguments()
 
@@ -88,7 +88,7 @@ def other_loads(found: Identification, key: str, few: slice, progress: bool | st
     ]
 
 
-def reversed_actuators(found: Identification, key: str, few: slice, progress: bool | str) -> tuple[str, float, float]:
+def reversed_actuators(found: Identification, key: str, few: Any, progress: bool | str) -> tuple[str, float, float]:
     """The signs of actuators that explain most of positions, and the share of the variance that they and those given leave.
 
     Each choice of signs counts by what one linear step of all parameters within their priors would leave, from where the fit
@@ -175,7 +175,7 @@ def _ratios(found: Identification) -> dict[str, float]:
 
 
 def _better(
-    found: Identification, key: str, few: slice, changes: Mapping[str, Mapping[str, Any]], progress: bool | str
+    found: Identification, key: str, few: Any, changes: Mapping[str, Mapping[str, Any]], progress: bool | str
 ) -> Iterator[tuple[str, float]]:
     """Yield the change of the measurements with which a fit leaves far less, if one does, and what it leaves, relative."""
     rows, start = found.fitted.measurements[few], _at_start(found)

@@ -208,10 +208,7 @@ def _put(whole: States, rows: Any, states: States, some: Any) -> None:
 
 def _evaluated(model: SoftModel, whole: States, rows: Any, tolerance: float) -> tuple[States, FloatArray, FloatArray] | None:
     """States of some rows, the residual, shape (N, n_springs), and the size that counts as none, (N,); None: out of range."""
-    some = {name: load[rows] for name, load in whole.loads.items()}
-    at = EquilibriumDerivatives(
-        model, whole._replace(q_motors=whole.q_motors[rows], q_springs=whole.q_springs[rows], loads=some)
-    )
+    at = EquilibriumDerivatives(model, whole.rows(rows))
     if not at.valid:
         return None
     (n, count), n_joints = at.strains.shape, at.n_joint_motors

@@ -64,12 +64,13 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
         progress: Whether to show a bar where fits are tried, or its label.
     """
     rows = found.fitted.measurements
-    texts, far = load_units(found), _far_from_priors(found)
-    few = slice(None, None, -(-len(rows) // _MOST_SOLVED))
+    texts, far, residuals = load_units(found), _far_from_priors(found), found.residuals.values()
+    counted = np.flatnonzero(np.any([np.isfinite(one).any(axis=1) for one in residuals], axis=0))
+    few = counted[:: -(-len(counted) // _MOST_SOLVED) or 1]
     for key, values in found.fitted.predicted.items():
         measured, predicted, before = _points(rows.measured[key]), _points(values), len(texts)
-        others = np.delete(np.arange(len(rows)), found.outliers)  # single mistakes are no reason to fit again
-        texts += suspicions(measured, predicted, rows.q_motors, name=key)
+        others = np.setdiff1d(counted, found.outliers)  # single mistakes are no reason to fit again
+        texts += suspicions(measured[counted], predicted[counted], rows.q_motors[counted], name=key)
         left = _unexplained(measured[others], predicted[others])
         placed, bad = key.startswith(("positions.", "poses.")), left > UNEXPLAINED
         if placed and bad:
@@ -82,7 +83,7 @@ def hints(found: Identification, *, progress: bool | str = False) -> list[str]:
             texts += other_axes(found, key, few, progress) if len(texts) == before else []
         if placed and (bad or rescaled(found)) and not texts:
             texts += other_loads(found, key, few, progress)
-        share = _unexplained(measured, predicted)
+        share = _unexplained(measured[counted], predicted[counted])
         if len(texts) == before and left > _MUCH:
             texts.append(
                 f"{key}: {100.0 * share:.2g} % of the variance are left unexplained: are order and signs of the actuators "
@@ -227,7 +228,7 @@ def _tied(found: Identification) -> list[str]:
 def _other_frame(found: Identification, key: str, rows: Measurements, before: float) -> list[str]:
     """The frame whose predicted positions explain far more, if there is one."""
     own = rows.markers.get(key.partition(".")[2], key.partition(".")[2])
-    prediction = Predictor(ParameterSet.of(found.model, found.names, rows.markers), rows).at(found.solution)
+    prediction = Predictor(ParameterSet.of(found.model, found.names, rows.markers), rows, gaps=True).at(found.solution)
     links = [frame.name for frame in found.model.pinocchio.frames if frame.type == pin.FrameType.BODY and frame.name != own]
     shares = {link: _unexplained(_points(rows.measured[key]), prediction.frame(link)[0]) for link in links}
     best = min(shares, key=shares.__getitem__)

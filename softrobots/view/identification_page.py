@@ -13,9 +13,9 @@ from softrobots.core.checks import FloatArray, instance_of, positive_integer
 from softrobots.core.errors import ParameterError
 from softrobots.identification.derivatives.rows_and_states import States
 from softrobots.identification.identification import Comparison, Identification
+from softrobots.identification.measured_robot import load_cases
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
-from softrobots.statics.loads import Load
 from softrobots.view.animation_frames import FRAME_RATE
 from softrobots.view.appearance import DOT_SIZE, rgb
 from softrobots.view.legend import LegendEntry
@@ -46,7 +46,7 @@ class IdentificationPage(Viewer):
             port: Port of the page; by default the first free one from 7000.
 
         Raises:
-            ParameterError: If it is no fit, no positions or poses of such rows were measured, or an argument is out of range.
+            ParameterError: If it is no fit, no positions or poses of such rows were measured, or an argument does not fit.
             ViewerError: If the server does not start, or a shape cannot be drawn.
         """
         instance_of("result", result, Identification, "an Identification")
@@ -54,13 +54,17 @@ class IdentificationPage(Viewer):
         lengths = [] if shown is None else [np.linalg.norm(shown.residuals[key][:, :3], axis=1) for key in _places(shown)]
         if shown is None or not lengths:
             raise ParameterError("result", result, "a fit with such rows in which positions or poses were measured")
+        if aside and shown.states is None and result.model.structure.friction is not None:
+            raise ParameterError(
+                "aside", aside, "False of a file of a robot with dry friction, which does not tell what came before"
+            )
         distances = np.max(np.nan_to_num(lengths), axis=0)
         rows = _chosen(distances, most)
         super().__init__(result.model, port=port)
         try:
             parameters = ParameterSet.of(self._model, result.names, shown.measurements.markers)
-            states = shown.states or Predictor(parameters, shown.measurements).at(result.solution).at.states
-            scenes = self._rows(states, rows)
+            states = shown.states or Predictor(parameters, shown.measurements, gaps=True).at(result.solution).at.states
+            scenes = self._rows(states.rows(rows))
             self._robot.show(next(iter(scenes.values())))
             animation = self._robot.animate(scenes)
             base = pin.SE3(pin.exp3(parameters.base(result.solution)[1]), parameters.base(result.solution)[0])
@@ -77,15 +81,12 @@ class IdentificationPage(Viewer):
             self.close()
             raise
 
-    def _rows(self, states: States, rows: NDArray[np.int_]) -> dict[int, Scene]:
+    def _rows(self, states: States) -> dict[int, Scene]:
         """The predicted robot in the rows, by number of frame: at the begin and the end of a second each."""
-        model = self._model
         scenes: dict[int, Scene] = {}
-        for place, row in enumerate(rows.tolist()):
-            wrenches = {name: wrench[row] for name, wrench in states.loads.items() if name}
-            load = Load(wrenches, tuple(states.loads[""][row].tolist()) if "" in states.loads else None)
-            tensions = states.actuator_loads[row, model.n_motors - len(model.muscles) :]
-            scene = self._scenes.state(states.q_motors[row], states.q_springs[row], load, tensions)
+        for place, load in enumerate(load_cases(states.loads, len(states.q_motors))):
+            tensions = states.actuator_loads[place, self._model.n_motors - len(self._model.muscles) :]
+            scene = self._scenes.state(states.q_motors[place], states.q_springs[place], load, tensions)
             scenes |= dict.fromkeys((place * FRAME_RATE, (place + 1) * FRAME_RATE - 1), scene)
         return scenes
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -36,6 +36,11 @@ class States(NamedTuple):
         (n, count), n_motors = springs.shape, model.n_motors
         rest = (np.zeros((n, *shape)) for shape in ((n_motors,), (count, count), (count, n_motors)))
         return cls(motors, springs, loads, *rest)
+
+    def rows(self, some: Any) -> States:
+        """Return some of the states, by indices or truth values."""
+        parts = {name: one[some] for name, one in self._asdict().items() if name != "loads" and one is not None}
+        return self._replace(loads={name: load[some] for name, load in self.loads.items()}, **parts)
 
     @classmethod
     def of(cls, equilibria: Sequence[Equilibrium]) -> States:
