@@ -136,6 +136,28 @@ def test_poses_of_frames_are_candidates_whatever_their_rotation() -> None:
     assert np.all(np.isfinite(found.intervals))
 
 
+@pytest.mark.parametrize(("guide", "quantity"), [(0.0, "positions"), (0.1, "poses")])
+def test_rows_that_a_mask_leaves_out_happen_where_the_robot_rubs(guide: float, quantity: str) -> None:
+    """Intervals of all rows that count, from differences of the whole course; angles are as good as unknown."""
+    names, random = ("young_modulus", "bending_friction"), np.random.default_rng(0)
+    arm = sr.TendonArm(segment_lengths=(0.06,), elastic_sections=1, bending_friction=1e-3, guide_friction=guide)
+    robot, mask, tips = sr.load_model(arm), ~np.isin(np.arange(8), (2, 5)), []
+    motors = robot.relaxed_motors - random.uniform(-1e-3, 4e-3, (8, robot.n_motors))
+    for name in names:
+        for factor in (1.0 + 1e-6, 1.0 - 1e-6):
+            other, now = sr.load_model(replace(arm, **{name: (factor * np.array(getattr(arm, name))).tolist()})), None
+            for q in motors:
+                now = sr.solve_equilibrium(other, q, previous=now, tolerance=1e-12)
+                tips.append(now.tip_position)
+    ends = np.reshape(tips, (2, 2, 8, 3))[:, :, mask]
+    inside = ((ends[:, 0] - ends[:, 1]) / 2e-6 / 1e-3).reshape(2, -1).T  # by relative changes, in standard deviations
+    seen, std = (np.tile(np.eye(4), (8, 1, 1)), (1e-3, 1e3)) if quantity == "poses" else (np.zeros((8, 3)), 1e-3)
+    rows = sr.Measurements(motors, **{quantity: {"tip": seen}}, std={f"{quantity}.tip": std}, mask=mask)
+    found = sr.informative_poses(arm, names, rows, 6)
+    expected = 1.959964 * np.sqrt(np.diag(np.linalg.inv(inside.T @ inside))) * [1.0, 1e-3]  # of a logarithm, of a value
+    assert found.margins["all"] == pytest.approx(expected, rel=1e-3)  # sliders turn within a stick, which the steps see
+
+
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [

@@ -165,7 +165,8 @@ def _compare(
     """The errors of sets of parameters on families that are left out, if that is asked for."""
     if len(sets) == 1 and arguments.families is None:
         return None
-    seen = rows if arguments.hold_out is None else rows[~labelled(rows.labels or (), arguments.hold_out)]
+    held = labelled(rows.labels or ("",) * len(rows), arguments.hold_out or ())
+    seen = Measurements(**rows.arguments() | {"mask": rows.mask & ~held})  # with dry friction all rows happen
     return cross_validate(model, seen, sets, arguments.families, progress=True, **options)
 
 

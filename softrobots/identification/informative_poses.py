@@ -111,8 +111,8 @@ def informative_poses(
     rates = np.where(chosen.logarithmic, chosen.values, 1.0)
     known = np.zeros(len(rates))
     known[prior.places] = (rates[prior.places] / prior.std) ** 2
-    rows = _rows(chosen, candidates[counted]) * rates
-    before = rows[:0, 0] if measured is None else (_rows(chosen, measured[measured.mask]) * rates).reshape(-1, len(rates))
+    rows = _rows(chosen, candidates) * rates
+    before = rows[:0, 0] if measured is None else (_rows(chosen, measured) * rates).reshape(-1, len(rates))
     random = np.random.default_rng(seed)
 
     def uncertainty(some: Any) -> Uncertainty:
@@ -168,19 +168,22 @@ def _unmeasured(q_motors: Any, std: Mapping[str, Any], loads: Mapping[str, Any])
 
 
 def _rows(chosen: ParameterSet, measurements: Measurements) -> FloatArray:
-    """Derivatives of each candidate's rows by the parameters in standard deviations, shape (candidates, k, P); 0 if missing."""
+    """Derivatives of what each row that counts would measure, in standard deviations, shape (rows, k, P); 0 if missing."""
     lacking = [key for key in measurements.measured if key not in measurements.std]
     if lacking:
         raise ParameterError("std", dict(measurements.std), f"given for all that is measured; it lacks {', '.join(lacking)}")
+    in_order = chosen.present.structure.friction is not None  # all rows happen then, one after the other
+    measurements = measurements if in_order else measurements[measurements.mask]
     predictor = Predictor(chosen, measurements.in_order_of(chosen.present))
     predictor.refresh(chosen.values)
     prediction = predictor.at(chosen.values)
     parts = []
     for key, difference in prediction.differences().items():
         kind, _, name = key.partition(".")  # of a pose the measured rotation does not matter
-        slopes = -prediction.frame_slopes(name) if kind == "poses" else prediction.slopes()[key]
+        posed = kind == "poses" and not predictor.by_differences
+        slopes = -prediction.frame_slopes(name) if posed else prediction.slopes()[key]
         parts.append(np.where(np.isfinite(difference)[..., None], slopes / measurements.std[key][..., None], 0.0))
-    return np.concatenate(parts, axis=1)
+    return np.concatenate(parts, axis=1)[measurements.mask]
 
 
 def d_optimal(rows: FloatArray, n: int, known: FloatArray) -> NDArray[np.int_]:
