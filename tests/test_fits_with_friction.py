@@ -141,7 +141,7 @@ def test_rows_without_an_equilibrium_are_told_and_the_others_follow_one_another(
     model, pulls = sr.load_model(arm), np.array(measured.q_motors)
     pulls[3] = np.resize([0.05, -0.05], model.n_motors)
     rows = sr.Measurements(**measured.arguments() | {"q_motors": pulls})
-    with pytest.raises(sr.ParameterError, match=r"not row 3\): start from others, or leave these out;"):
+    with pytest.raises(sr.ParameterError, match=r"not row 3\): start elsewhere, or leave these out;"):
         sr.identify(arm, rows, "axial_stiffness")
     fit = sr.identify(arm, measured, "axial_stiffness", validation=rows, max_iterations=1)
     assert fit.validation is not None

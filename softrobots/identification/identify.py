@@ -90,8 +90,7 @@ def identify(
         if key.partition(".")[0] not in QUANTITIES:
             raise ParameterError("measurements", key, f"of quantities that are fitted: {', '.join(QUANTITIES)}")
     most, count = positive_integer("max_iterations", max_iterations), positive_integer("starts", starts)
-    known = isinstance(parameters, ParameterSet)
-    chosen: Any = parameters if known else ParameterSet.of(robot, parameters, measurements.markers)  # type: ignore[arg-type]
+    chosen = parameters if isinstance(parameters, ParameterSet) else ParameterSet.of(robot, parameters, measurements.markers)
     loads = [one.name for one in chosen.parameters if one.place.kind in ("motor", "force", "wrench", "gravity")]
     if loads:
         raise ParameterError("parameters", loads[0], "no load or actuator coordinate: measurements give those")

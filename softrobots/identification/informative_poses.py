@@ -172,16 +172,15 @@ def _rows(chosen: ParameterSet, measurements: Measurements) -> FloatArray:
     lacking = [key for key in measurements.measured if key not in measurements.std]
     if lacking:
         raise ParameterError("std", dict(measurements.std), f"given for all that is measured; it lacks {', '.join(lacking)}")
-    in_order = chosen.present.structure.friction is not None  # all rows happen then, one after the other
-    measurements = measurements if in_order else measurements[measurements.mask]
+    rubs = chosen.present.structure.friction is not None  # the others happen then, too
+    measurements = measurements if rubs else measurements[measurements.mask]
     predictor = Predictor(chosen, measurements.in_order_of(chosen.present))
     predictor.refresh(chosen.values)
     prediction = predictor.at(chosen.values)
     parts = []
     for key, difference in prediction.differences().items():
         kind, _, name = key.partition(".")  # of a pose the measured rotation does not matter
-        posed = kind == "poses" and not predictor.by_differences
-        slopes = -prediction.frame_slopes(name) if posed else prediction.slopes()[key]
+        slopes = prediction.slopes()[key] if kind != "poses" or predictor.by_differences else -prediction.frame_slopes(name)
         parts.append(np.where(np.isfinite(difference)[..., None], slopes / measurements.std[key][..., None], 0.0))
     return np.concatenate(parts, axis=1)[measurements.mask]
 

@@ -228,13 +228,9 @@ class Predictor:
             rest = np.flatnonzero(~balanced_rows(model, states, _TOLERANCE)).tolist()
             self.lost = searched_rows(model, states, rest, starts, _TOLERANCE)
         if self.lost and not self.gaps:
-            more = f" and {len(self.lost) - 10} more" if len(self.lost) > 10 else ""
-            words = ", ".join(map(measurements.where, self.lost[:10])) + more
-            requirement = (
-                f"rows with an equilibrium at the starting values (not {words}): start from others, or leave these out"
-            )
-            requirement += "" if self.in_order else " by the mask"
-            requirement += "; are order, signs and units of actuators and loads right?"
+            words = ", ".join(map(measurements.where, self.lost[:10])) + (", ..." if len(self.lost) > 10 else "")
+            requirement = f"rows with an equilibrium at the starting values (not {words}): start elsewhere, or leave these out"
+            requirement += f"{'' if self.in_order else ' by the mask'}; are order, sign and unit of actuators and loads right?"
             raise ParameterError("measurements", measurements, requirement)
         states.q_springs[self.lost] = model.rest
         self._springs, self._sliders = states.q_springs, sliders

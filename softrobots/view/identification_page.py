@@ -55,9 +55,7 @@ class IdentificationPage(Viewer):
         if shown is None or not lengths:
             raise ParameterError("result", result, "a fit with such rows in which positions or poses were measured")
         if aside and shown.states is None and result.model.structure.friction is not None:
-            raise ParameterError(
-                "aside", aside, "False of a file of a robot with dry friction, which does not tell what came before"
-            )
+            raise ParameterError("aside", aside, "False of a file of a robot with dry friction: what came before is not told")
         distances = np.max(np.nan_to_num(lengths), axis=0)
         rows = _chosen(distances, most)
         super().__init__(result.model, port=port)
