@@ -11,6 +11,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 import softrobots as sr
+from softrobots.identification import identify as fits
 from softrobots.identification.parameters import ParameterSet
 from softrobots.identification.prediction import Predictor
 from softrobots.identification.suspicions import hints
@@ -150,6 +151,33 @@ def test_rows_without_an_equilibrium_are_told_and_the_others_follow_one_another(
     others = np.delete(np.arange(6), 3)
     one = Predictor(ParameterSet.of(fit.model, "base.position", {}), measured[others]).at(np.zeros(3))
     np.testing.assert_allclose(fit.validation.states.q_springs[others], one.at.strains, rtol=0.0, atol=1e-8)
+
+
+@pytest.mark.study
+def test_a_search_begins_anew_where_that_without_friction_has_gone_too_far(
+    rng: np.random.Generator, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Without friction twice the stiffness is told, of which the robot with friction has no equilibria."""
+    arm, measured = wandering(rng, 20)
+    true = arm.bending_in_force[1]
+    start = sr.TendonArm(**ARM, bending_stiffness=(arm.bending_in_force[0], 1.1 * true))
+    solved, searched = Predictor._solve, fits._best
+
+    def solve(predictor: Predictor, model: sr.SoftModel, values: np.ndarray) -> Any:
+        if predictor.in_order and values[0] > 1.5 * true:
+            raise sr.ParameterError("measurements", values, "rows with an equilibrium")
+        return solved(predictor, model, values)
+
+    def search(predictor: Predictor, *others: Any) -> Any:
+        found = searched(predictor, *others)
+        if not predictor.in_order:
+            found.course.append((found.cost, np.array([2.0 * true])))
+        return found
+
+    monkeypatch.setattr(Predictor, "_solve", solve)
+    monkeypatch.setattr(fits, "_best", search)
+    found = sr.identify(start, measured, "segment[2].bending_stiffness")
+    assert found.values["segment[2].bending_stiffness"] == pytest.approx(true, rel=1e-3)  # kinks where rows begin to slip
 
 
 @pytest.mark.study

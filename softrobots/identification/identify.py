@@ -79,12 +79,7 @@ def identify(
         NameNotFound: If there is no such parameter, frame or label.
         DescriptionError: If the robot cannot be loaded.
     """
-    instance_of(
-        "measurements",
-        measurements,
-        Measurements,
-        "Measurements(q_motors, ...), or what Measurements.from_csv or .from_dataframe returns",
-    )
+    instance_of("measurements", measurements, Measurements, "Measurements(q_motors, ...), or what its from_csv returns")
     choice("loss", loss, LOSSES)
     for key in measurements.measured:
         if key.partition(".")[0] not in QUANTITIES:
@@ -107,7 +102,7 @@ def identify(
     import scipy.optimize  # noqa: F401  # before the limit, which counts for what is loaded; importing it takes a while
 
     steps = iter(with_progress(itertools.count(), progress, label="identify", unit=" steps"))
-    values, message, every = _starts(chosen, seed, count), "", len(rows) // _FEW
+    values, message, every = (begin := _starts(chosen, seed, count)), "", len(rows) // _FEW
     calm, near = chosen.frictionless(), None
     weights: Any = None
     stages: list[tuple[ParameterSet, int, Stage]] = [(chosen, 1, "whole" if in_order else "last")]
@@ -129,8 +124,11 @@ def identify(
                 values, message = [best.values], message if message == INTERRUPTED else best.message
                 near = best.at_end()[0].at.states.q_springs if step == 1 and own is not chosen else None
             except SoftRobotsError:
-                if own is chosen:
+                if own is chosen and values is begin:
                     raise
+                if own is chosen:  # a search before has gone where rows have no equilibrium
+                    values, near = begin, None
+                    stages.append((chosen, 1, "whole"))
         again = not weights.known and (loss != "linear" or len(weights.std) > 1)
         if again and message != INTERRUPTED and best.cost > _PERFECT * len(weights.rows()):
             weights = weights.estimated(best.at_end()[0].differences())
