@@ -208,7 +208,8 @@ def _put(whole: States, rows: Any, states: States, some: Any) -> None:
 
 def _evaluated(model: SoftModel, whole: States, rows: Any, tolerance: float) -> tuple[States, FloatArray, FloatArray] | None:
     """States of some rows, the residual, shape (N, n_springs), and the size that counts as none, (N,); None: out of range."""
-    at = EquilibriumDerivatives(model, whole.rows(rows))
+    some = {name: load[rows] for name, load in whole.loads.items()}
+    at = EquilibriumDerivatives(model, States.at(model, whole.q_motors[rows], whole.q_springs[rows], some))
     if not at.valid:
         return None
     (n, count), n_joints = at.strains.shape, at.n_joint_motors
