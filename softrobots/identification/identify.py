@@ -79,7 +79,7 @@ def identify(
         NameNotFound: If there is no such parameter, frame or label.
         DescriptionError: If the robot cannot be loaded.
     """
-    instance_of("measurements", measurements, Measurements, "Measurements(q_motors, ...), Measurements.from_csv or .from_dataframe")
+    instance_of("measurements", measurements, Measurements, "Measurements(...), Measurements.from_csv or .from_dataframe")
     choice("loss", loss, LOSSES)
     for key in measurements.measured:
         if key.partition(".")[0] not in QUANTITIES:
