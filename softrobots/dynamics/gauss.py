@@ -129,9 +129,10 @@ class GaussRule(MidpointRule):
                 return np.stack([both.real, both.imag / SECOND])
 
             return by_one
-        blocks = [[h * WEIGHTS[i][j] * damping + h * h * SQUARES[i][j] * stiff[i] for j in range(2)] for i in range(2)]
-        for mass, row, place in zip(masses, blocks, range(2), strict=True):
-            row[place] = row[place] + mass
+        blocks = [
+            [(i == j) * masses[i] + h * WEIGHTS[i][j] * damping + h * h * SQUARES[i][j] * stiff[i] for j in range(2)]
+            for i in range(2)
+        ]
         own = lu_factor(np.block(blocks), check_finite=False)
         return lambda residual: np.asarray(lu_solve(own, residual.ravel(), check_finite=False)).reshape(2, -1)
 
