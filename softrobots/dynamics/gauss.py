@@ -18,7 +18,7 @@ Differential Equations II, 1996, section IV.8): `A` has the eigenvalues :math:`\
 .. math:: (M + h \lambda D + h^2 \lambda^2 K)\, d = r_1 + (2 - \sqrt3)\, i\, r_2, \quad
           \Delta a_1 = -\operatorname{Re} d, \quad \Delta a_2 = -(2 + \sqrt3) \operatorname{Im} d
 
-That takes `M` and `K` of the second stage for both. Where corrections shrink slowly, as between knees, each has its own.
+That takes `M` and `K` of the second stage for both. Where forces have knees, or corrections shrink slowly, each has its own.
 """
 
 from __future__ import annotations

@@ -49,7 +49,9 @@ def stopped_at(time: float, duration: float, error: Exception) -> str:
 
 
 def follow(recorder: Recorder, grid: FloatArray, *, to_knees: bool = False) -> Iterator[int]:
-    """Step through a grid of times, on demand to knees of springs, too; yield a row. What fails begins anew, then is halved.
+    """Step through a grid of times, on demand to the knees of springs, too; yield once for each row.
+
+    A step that fails begins anew without a guess from the steps before, and is halved if that fails, too.
 
     Raises:
         NoStep: If no step succeeds.
@@ -70,7 +72,7 @@ def follow(recorder: Recorder, grid: FloatArray, *, to_knees: bool = False) -> I
                 raise NoStep(f"no step from t = {now:.6g} s succeeds, down to a length of {length:.3g} s{_range_end(recorder)}")
             elif knee is not None:
                 targets.append(knee)
-            elif not recorder.rule.forget():  # or a worse guess than none made it fail
+            elif not recorder.rule.forget():  # else its guess may have been worse than none
                 targets.append(0.5 * (recorder.state.time + targets[-1]))
 
 
